@@ -1,1 +1,55 @@
-//! Scaffold.
+//! Extreme learning machines: regression by a hidden layer of random neurons and one linear
+//! solve.
+//!
+//! A network with one hidden layer computes $o(x) = \sum_k \beta_k f(\omega_k \cdot x + b_k)$.
+//! An extreme learning machine draws $\omega$ and $b$ at random, never trains them, and finds the
+//! output weights $\beta$ by linear least squares. Fitting is a matrix factorisation: it takes
+//! milliseconds, has no learning rate, and has one answer.
+//!
+//! ```
+//! use elm::ElmParams;
+//! use ndarray::array;
+//!
+//! let x = array![[0.0], [0.5], [1.0], [1.5], [2.0]];
+//! let t = array![0.0, 0.25, 1.0, 2.25, 4.0];
+//! let model = ElmParams::new(20).fit(&x, &t)?;
+//! let y = model.predict(&array![[1.2]])?;
+//! assert!((y[[0, 0]] - 1.44_f64).abs() < 0.1);
+//! # Ok::<(), elm::Error>(())
+//! ```
+//!
+//! - [`ElmParams`] holds the settings, [`Elm`] the fitted network.
+//! - [`Activation`] is the neurons' function, one of seven or your own.
+//! - [`solve`] has the solvers: equations 10 and 11 of the ELM literature, and ridge regression
+//!   with its strength chosen by exact leave-one-out, which is the default.
+//! - [`metrics`] has RMSE, MAE and correlation.
+//!
+//! Everything is generic over [`Scalar`], `f32` or `f64`. No input makes the public API panic:
+//! what cannot be fitted or predicted is an [`Error`] that names the place.
+//!
+//! # Reproducibility
+//! One seed draws one random layer, bit for bit, on every platform. The solve is sequential, so
+//! its result does not depend on the number of threads; between processors with different vector
+//! units it agrees to rounding error.
+//!
+//! # Features
+//! - `faer` (default): linear algebra in pure Rust.
+//! - `openblas-system`: LAPACK from the system's OpenBLAS, in place of faer.
+
+pub mod activation;
+mod error;
+mod hidden;
+mod linalg;
+pub mod metrics;
+mod model;
+mod scalar;
+mod scaler;
+pub mod solve;
+
+pub use activation::Activation;
+pub use error::{Error, Result};
+pub use hidden::{Distribution, HiddenLayer};
+pub use linalg::backend;
+pub use model::{CheckedParams, Elm, ElmParams, Targets};
+pub use scalar::Scalar;
+pub use scaler::Scaler;

@@ -1,0 +1,102 @@
+//! What can go wrong, as one enum. Variants carry numbers and names; the text is made on display.
+
+use thiserror::Error;
+
+/// Result of everything in this crate that can fail.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Why a fit, a prediction or a file was refused.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A setting lies outside its range.
+    #[error("{name} is {value}, but must be {expected}")]
+    Parameter {
+        /// The setting, as its setter is called.
+        name: &'static str,
+        /// What it was set to.
+        value: f64,
+        /// The range it must lie in.
+        expected: &'static str,
+    },
+    /// An array has no rows or no columns.
+    #[error("{what} is empty ({rows} x {columns})")]
+    Empty {
+        /// Which array.
+        what: &'static str,
+        /// Its rows.
+        rows: usize,
+        /// Its columns.
+        columns: usize,
+    },
+    /// Two sizes that must agree do not.
+    #[error("{what}: expected {expected}, found {found}")]
+    Shape {
+        /// Which size.
+        what: &'static str,
+        /// The size it must have.
+        expected: usize,
+        /// The size it has.
+        found: usize,
+    },
+    /// A value is NaN or infinite.
+    #[error("{what}: the value at row {row}, column {column} (counted from 0) is not finite")]
+    NotFinite {
+        /// Which array.
+        what: &'static str,
+        /// Row of the first such value.
+        row: usize,
+        /// Column of the first such value.
+        column: usize,
+    },
+    /// Equation 10 inverts the hidden-layer matrix, which must be square for that.
+    #[error(
+        "the solver 'inverse' (eq. 10) needs as many neurons as training rows, \
+         found {neurons} neurons and {rows} rows"
+    )]
+    NotSquare {
+        /// Rows of the hidden-layer matrix.
+        rows: usize,
+        /// Columns of the hidden-layer matrix.
+        neurons: usize,
+    },
+    /// Equation 10 inverts the hidden-layer matrix, which must not be singular.
+    #[error(
+        "the hidden-layer matrix is singular to working precision \
+         (reciprocal condition {reciprocal_condition:e}): eq. 10 has no answer"
+    )]
+    Singular {
+        /// Smallest over largest singular value.
+        reciprocal_condition: f64,
+    },
+    /// Two settings exclude each other.
+    #[error("{first} and {second} exclude each other")]
+    Conflict {
+        /// One setting.
+        first: &'static str,
+        /// The other setting.
+        second: &'static str,
+    },
+    /// A factorisation did not converge.
+    #[error("{what} did not converge")]
+    NoConvergence {
+        /// Which factorisation.
+        what: &'static str,
+    },
+    /// A result lies outside the range of the floating-point type.
+    #[error("{what} overflows the floating-point range")]
+    Overflow {
+        /// Which result.
+        what: &'static str,
+    },
+    /// A name that is not one of those known.
+    #[error("unknown {what} '{name}' (expected one of: {expected})")]
+    UnknownName {
+        /// What was being named.
+        what: &'static str,
+        /// The name that was given.
+        name: String,
+        /// The names there are.
+        expected: &'static str,
+    },
+}

@@ -1,0 +1,257 @@
+//! faer behind ndarray. Every matrix crosses as a slice, so no `unsafe` is needed.
+
+use faer::diag::DiagMut;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::householder::{
+    apply_block_householder_sequence_transpose_on_the_left_in_place_scratch as apply_q_transpose_scratch,
+    apply_block_householder_sequence_transpose_on_the_left_in_place_with_conj as apply_q_transpose,
+};
+use faer::linalg::lu::partial_pivoting as lu;
+use faer::linalg::matmul::matmul;
+use faer::linalg::qr::no_pivoting as qr;
+use faer::linalg::svd::{ComputeSvdVectors, svd, svd_scratch};
+use faer::linalg::{cholesky::llt, triangular_solve};
+use faer::traits::RealField;
+use faer::{Accum, Conj, MatMut, MatRef, Par};
+use ndarray::{Array1, Array2, ArrayView2, Axis, CowArray, Ix2, ShapeBuilder, s};
+use num_traits::Zero;
+
+use super::{Failure, Kernel, Svd, Triangular};
+
+const PAR: Par = Par::Seq;
+
+/// A copy laid out by columns, as the factorisations want it.
+fn by_columns<A: Copy + Zero>(a: ArrayView2<'_, A>) -> Array2<A> {
+    let mut out = Array2::zeros(a.dim().f());
+    out.assign(&a);
+    out
+}
+
+/// The array itself where it lies without gaps, else a copy that does.
+fn gapless<A: Copy>(a: ArrayView2<'_, A>) -> CowArray<'_, A, Ix2> {
+    if a.is_standard_layout() || a.t().is_standard_layout() {
+        a.into()
+    } else {
+        a.as_standard_layout().into_owned().into()
+    }
+}
+
+/// faer's view of a gapless array; a slice in either order is always there for one.
+fn view<A>(a: ArrayView2<'_, A>) -> MatRef<'_, A> {
+    let (rows, columns) = a.dim();
+    if let Some(slice) = a.to_slice() {
+        MatRef::from_row_major_slice(slice, rows, columns)
+    } else {
+        let slice = a.reversed_axes().to_slice().unwrap_or(&[]);
+        MatRef::from_column_major_slice(slice, rows, columns)
+    }
+}
+
+/// faer's mutable view of an array made by [`by_columns`].
+fn view_mut<A>(a: &mut Array2<A>) -> MatMut<'_, A> {
+    let (rows, columns) = a.dim();
+    MatMut::from_column_major_slice_mut(
+        a.as_slice_memory_order_mut().unwrap_or(&mut []),
+        rows,
+        columns,
+    )
+}
+
+fn product<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>, b: ArrayView2<'_, A>) -> Array2<A> {
+    let mut out = Array2::zeros((a.nrows(), b.ncols()));
+    if out.is_empty() {
+        return out;
+    }
+    let (a, b) = (gapless(a), gapless(b));
+    let (rows, columns) = out.dim();
+    let slice = out.as_slice_memory_order_mut().unwrap_or(&mut []);
+    let dst = MatMut::from_row_major_slice_mut(slice, rows, columns);
+    matmul(
+        dst,
+        Accum::Replace,
+        view(a.view()),
+        view(b.view()),
+        faer::traits::math_utils::one(),
+        PAR,
+    );
+    out
+}
+
+fn decompose<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>) -> Result<Svd<A>, Failure> {
+    let (rows, columns) = a.dim();
+    let k = rows.min(columns);
+    let a = gapless(a);
+    let mut s = Array1::zeros(k);
+    let mut u = Array2::zeros((rows, k).f());
+    let mut v = Array2::zeros((columns, k).f());
+    let thin = ComputeSvdVectors::Thin;
+    let scratch = svd_scratch::<A>(rows, columns, thin, thin, PAR, Default::default());
+    svd(
+        view(a.view()),
+        DiagMut::from_slice_mut(s.as_slice_memory_order_mut().unwrap_or(&mut [])),
+        Some(view_mut(&mut u)),
+        Some(view_mut(&mut v)),
+        PAR,
+        MemStack::new(&mut MemBuffer::new(scratch)),
+        Default::default(),
+    )
+    .map_err(|_| Failure::NoConvergence)?;
+    Ok(Svd {
+        u,
+        s,
+        vt: v.reversed_axes(),
+    })
+}
+
+fn singular_values<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>) -> Result<Array1<A>, Failure> {
+    let (rows, columns) = a.dim();
+    let a = gapless(a);
+    let mut s = Array1::zeros(rows.min(columns));
+    let none = ComputeSvdVectors::No;
+    let scratch = svd_scratch::<A>(rows, columns, none, none, PAR, Default::default());
+    svd(
+        view(a.view()),
+        DiagMut::from_slice_mut(s.as_slice_memory_order_mut().unwrap_or(&mut [])),
+        None,
+        None,
+        PAR,
+        MemStack::new(&mut MemBuffer::new(scratch)),
+        Default::default(),
+    )
+    .map_err(|_| Failure::NoConvergence)?;
+    Ok(s)
+}
+
+fn triangularise<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
+    a: ArrayView2<'_, A>,
+    b: ArrayView2<'_, A>,
+) -> Triangular<A> {
+    let (rows, columns) = a.dim();
+    let mut basis = by_columns(a);
+    let block = qr::factor::recommended_block_size::<A>(rows, columns);
+    let mut factor = Array2::zeros((block, columns).f());
+    let scratch =
+        qr::factor::qr_in_place_scratch::<A>(rows, columns, block, PAR, Default::default())
+            .or(apply_q_transpose_scratch::<A>(rows, block, b.ncols()));
+    let mut memory = MemBuffer::new(scratch);
+    let stack = MemStack::new(&mut memory);
+    qr::factor::qr_in_place(
+        view_mut(&mut basis),
+        view_mut(&mut factor),
+        PAR,
+        stack,
+        Default::default(),
+    );
+    let mut qtb = by_columns(b);
+    apply_q_transpose(
+        view(basis.view()),
+        view(factor.view()),
+        Conj::No,
+        view_mut(&mut qtb),
+        PAR,
+        stack,
+    );
+    let r = Array2::from_shape_fn((columns, columns), |(i, j)| {
+        if i <= j { basis[[i, j]] } else { A::zero() }
+    });
+    let unreached = qtb.slice(s![columns.., ..]).map_axis(Axis(0), |column| {
+        column.iter().fold(A::zero(), |sum, &v| sum + v * v)
+    });
+    Triangular {
+        r,
+        qtb: qtb.slice(s![..columns, ..]).to_owned(),
+        unreached,
+    }
+}
+
+fn solve_square<A: RealField + Copy + Zero + PartialEq>(
+    a: ArrayView2<'_, A>,
+    b: ArrayView2<'_, A>,
+) -> Result<Array2<A>, Failure> {
+    let n = a.nrows();
+    let mut factor = by_columns(a);
+    let mut x = by_columns(b);
+    let (mut forward, mut backward) = (vec![0_usize; n], vec![0_usize; n]);
+    let scratch = lu::factor::lu_in_place_scratch::<usize, A>(n, n, PAR, Default::default()).or(
+        lu::solve::solve_in_place_scratch::<usize, A>(n, b.ncols(), PAR),
+    );
+    let mut memory = MemBuffer::new(scratch);
+    let stack = MemStack::new(&mut memory);
+    let (_, permutation) = lu::factor::lu_in_place(
+        view_mut(&mut factor),
+        &mut forward,
+        &mut backward,
+        PAR,
+        stack,
+        Default::default(),
+    );
+    if factor.diag().iter().any(|pivot| *pivot == A::zero()) {
+        return Err(Failure::Pivot);
+    }
+    let both = view(factor.view());
+    lu::solve::solve_in_place(both, both, permutation, view_mut(&mut x), PAR, stack);
+    Ok(x)
+}
+
+fn solve_positive<A: RealField + Copy + Zero>(
+    a: ArrayView2<'_, A>,
+    b: ArrayView2<'_, A>,
+) -> Result<Array2<A>, Failure> {
+    let n = a.nrows();
+    let mut factor = by_columns(a);
+    let mut x = by_columns(b);
+    let scratch = llt::factor::cholesky_in_place_scratch::<A>(n, PAR, Default::default());
+    llt::factor::cholesky_in_place(
+        view_mut(&mut factor),
+        Default::default(),
+        PAR,
+        MemStack::new(&mut MemBuffer::new(scratch)),
+        Default::default(),
+    )
+    .map_err(|_| Failure::Pivot)?;
+    let lower = view(factor.view());
+    triangular_solve::solve_lower_triangular_in_place(lower, view_mut(&mut x), PAR);
+    triangular_solve::solve_upper_triangular_in_place(lower.transpose(), view_mut(&mut x), PAR);
+    Ok(x)
+}
+
+macro_rules! kernel {
+    ($($scalar:ty),*) => {$(
+        impl Kernel for $scalar {
+            fn product(a: ArrayView2<'_, Self>, b: ArrayView2<'_, Self>) -> Array2<Self> {
+                product(a, b)
+            }
+
+            fn svd(a: ArrayView2<'_, Self>) -> Result<Svd<Self>, Failure> {
+                decompose(a)
+            }
+
+            fn singular_values(a: ArrayView2<'_, Self>) -> Result<Array1<Self>, Failure> {
+                singular_values(a)
+            }
+
+            fn triangularise(
+                a: ArrayView2<'_, Self>,
+                b: ArrayView2<'_, Self>,
+            ) -> Result<Triangular<Self>, Failure> {
+                Ok(triangularise(a, b))
+            }
+
+            fn solve_square(
+                a: ArrayView2<'_, Self>,
+                b: ArrayView2<'_, Self>,
+            ) -> Result<Array2<Self>, Failure> {
+                solve_square(a, b)
+            }
+
+            fn solve_positive(
+                a: ArrayView2<'_, Self>,
+                b: ArrayView2<'_, Self>,
+            ) -> Result<Array2<Self>, Failure> {
+                solve_positive(a, b)
+            }
+        }
+    )*};
+}
+
+kernel!(f32, f64);

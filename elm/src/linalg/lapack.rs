@@ -1,0 +1,103 @@
+//! LAPACK, by way of ndarray-linalg, over the system's OpenBLAS.
+
+use ndarray::{Array1, Array2, ArrayView2, Axis, Zip};
+use ndarray_linalg::error::LinalgError;
+use ndarray_linalg::{
+    Cholesky, Diag, Factorize, JobSvd, Lapack, QR, SVDDC, Scalar as _, Solve, SolveTriangular, UPLO,
+};
+use num_traits::Zero;
+
+use super::{Failure, Kernel, Svd, Triangular};
+
+fn no_convergence(_: LinalgError) -> Failure {
+    Failure::NoConvergence
+}
+
+fn pivot(_: LinalgError) -> Failure {
+    Failure::Pivot
+}
+
+fn decompose<A: Lapack<Real = A>>(a: ArrayView2<'_, A>) -> Result<Svd<A>, Failure> {
+    match a.svddc(JobSvd::Some).map_err(no_convergence)? {
+        (Some(u), s, Some(vt)) => Ok(Svd { u, s, vt }),
+        _ => Err(Failure::NoConvergence),
+    }
+}
+
+fn triangularise<A: Lapack<Real = A>>(
+    a: ArrayView2<'_, A>,
+    b: ArrayView2<'_, A>,
+) -> Result<Triangular<A>, Failure> {
+    let (q, r) = a.qr().map_err(no_convergence)?;
+    let qtb = q.t().dot(&b);
+    let rest = &b - &q.dot(&qtb);
+    let unreached = rest.map_axis(Axis(0), |column| column.iter().map(|v| v.square()).sum());
+    Ok(Triangular { r, qtb, unreached })
+}
+
+fn solve_square<A: Lapack<Real = A>>(
+    a: ArrayView2<'_, A>,
+    b: ArrayView2<'_, A>,
+) -> Result<Array2<A>, Failure> {
+    let factor = a.factorize().map_err(pivot)?;
+    let mut x = Array2::zeros(b.dim());
+    for (mut solution, right) in x.columns_mut().into_iter().zip(b.columns()) {
+        solution.assign(&factor.solve(&right).map_err(pivot)?);
+    }
+    Ok(x)
+}
+
+fn solve_positive<A: Lapack<Real = A>>(
+    a: ArrayView2<'_, A>,
+    b: ArrayView2<'_, A>,
+) -> Result<Array2<A>, Failure> {
+    let lower: Array2<A> = a.cholesky(UPLO::Lower).map_err(pivot)?;
+    let upper = lower.t().as_standard_layout().into_owned();
+    let half = lower
+        .solve_triangular(UPLO::Lower, Diag::NonUnit, &b)
+        .map_err(pivot)?;
+    upper
+        .solve_triangular(UPLO::Upper, Diag::NonUnit, &half)
+        .map_err(pivot)
+}
+
+macro_rules! kernel {
+    ($($scalar:ty),*) => {$(
+        impl Kernel for $scalar {
+            fn product(a: ArrayView2<'_, Self>, b: ArrayView2<'_, Self>) -> Array2<Self> {
+                a.dot(&b)
+            }
+
+            fn svd(a: ArrayView2<'_, Self>) -> Result<Svd<Self>, Failure> {
+                decompose(a)
+            }
+
+            fn singular_values(a: ArrayView2<'_, Self>) -> Result<Array1<Self>, Failure> {
+                Ok(a.svddc(JobSvd::None).map_err(no_convergence)?.1)
+            }
+
+            fn triangularise(
+                a: ArrayView2<'_, Self>,
+                b: ArrayView2<'_, Self>,
+            ) -> Result<Triangular<Self>, Failure> {
+                triangularise(a, b)
+            }
+
+            fn solve_square(
+                a: ArrayView2<'_, Self>,
+                b: ArrayView2<'_, Self>,
+            ) -> Result<Array2<Self>, Failure> {
+                solve_square(a, b)
+            }
+
+            fn solve_positive(
+                a: ArrayView2<'_, Self>,
+                b: ArrayView2<'_, Self>,
+            ) -> Result<Array2<Self>, Failure> {
+                solve_positive(a, b)
+            }
+        }
+    )*};
+}
+
+kernel!(f32, f64);

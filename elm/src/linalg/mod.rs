@@ -1,0 +1,201 @@
+//! The few linear algebra primitives that the solvers need, and the only place that names a
+//! linear algebra crate. One file per back end; all take any strides and expect finite input.
+//!
+//! Sequential: at the sizes of an ELM the threads cost more than they bring, and a result must
+//! not depend on how many there are.
+
+#[cfg(all(feature = "faer", not(feature = "openblas-system")))]
+mod faer;
+#[cfg(feature = "openblas-system")]
+mod lapack;
+
+#[cfg(not(any(feature = "faer", feature = "openblas-system")))]
+compile_error!("elm-learn needs a linear algebra back end: feature `faer` or `openblas-system`");
+
+use ndarray::{Array1, Array2, ArrayView2};
+
+/// The linear algebra back end that this build uses, `"faer"` or `"openblas"`.
+#[must_use]
+pub fn backend() -> &'static str {
+    if cfg!(feature = "openblas-system") {
+        "openblas"
+    } else {
+        "faer"
+    }
+}
+
+/// A thin singular value decomposition $A = U \operatorname{diag}(s) V^T$, singular values
+/// falling.
+#[derive(Debug, Clone)]
+pub struct Svd<A> {
+    /// Shape (rows, min(rows, columns)).
+    pub u: Array2<A>,
+    /// Length min(rows, columns).
+    pub s: Array1<A>,
+    /// Shape (min(rows, columns), columns).
+    pub vt: Array2<A>,
+}
+
+/// A least-squares problem $\min \|AX - B\|$ reduced to its triangle by $A = QR$.
+#[derive(Debug, Clone)]
+pub struct Triangular<A> {
+    /// $R$, square, zero below the diagonal.
+    pub r: Array2<A>,
+    /// $Q^T B$, shape (columns of $A$, columns of $B$).
+    pub qtb: Array2<A>,
+    /// For each column of $B$, the sum of squares of the part that no combination of $A$'s
+    /// columns reaches.
+    pub unreached: Array1<A>,
+}
+
+/// Why a primitive gave no result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Failure {
+    /// An iteration limit was reached.
+    NoConvergence,
+    /// A pivot was zero or, for Cholesky, not positive.
+    Pivot,
+}
+
+/// What a back end provides for one scalar type.
+///
+/// Not public: it is named by the sealed [`Scalar`](crate::Scalar) alone.
+pub trait Kernel: Sized {
+    /// $A B$.
+    fn product(a: ArrayView2<'_, Self>, b: ArrayView2<'_, Self>) -> Array2<Self>;
+
+    /// The thin singular value decomposition.
+    fn svd(a: ArrayView2<'_, Self>) -> Result<Svd<Self>, Failure>;
+
+    /// The singular values alone, falling.
+    fn singular_values(a: ArrayView2<'_, Self>) -> Result<Array1<Self>, Failure>;
+
+    /// $A = QR$ for `a` with at least as many rows as columns, applied to `b`.
+    fn triangularise(
+        a: ArrayView2<'_, Self>,
+        b: ArrayView2<'_, Self>,
+    ) -> Result<Triangular<Self>, Failure>;
+
+    /// Solves $A X = B$ for square $A$ by LU with partial pivoting.
+    fn solve_square(
+        a: ArrayView2<'_, Self>,
+        b: ArrayView2<'_, Self>,
+    ) -> Result<Array2<Self>, Failure>;
+
+    /// Solves $A X = B$ for symmetric positive definite $A$ by Cholesky.
+    fn solve_positive(
+        a: ArrayView2<'_, Self>,
+        b: ArrayView2<'_, Self>,
+    ) -> Result<Array2<Self>, Failure>;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Scalar;
+    use approx::assert_abs_diff_eq;
+    use ndarray::{Array, Axis, array};
+    use ndarray_rand::RandomExt;
+    use ndarray_rand::rand_distr::StandardNormal;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    fn random(rows: usize, columns: usize, seed: u64) -> Array2<f64> {
+        Array::random_using(
+            (rows, columns),
+            StandardNormal,
+            &mut ChaCha8Rng::seed_from_u64(seed),
+        )
+    }
+
+    const SHAPES: [(usize, usize); 8] = [
+        (1, 1),
+        (5, 1),
+        (1, 5),
+        (7, 7),
+        (40, 7),
+        (7, 40),
+        (185, 60),
+        (300, 299),
+    ];
+
+    #[test]
+    fn svd_factors_multiply_to_the_matrix_and_are_orthonormal() {
+        for (rows, columns) in SHAPES {
+            // A transposed view too: the layout must not matter.
+            for a in [
+                random(rows, columns, 1).view(),
+                random(columns, rows, 2).t(),
+            ] {
+                let Svd { u, s, vt } = f64::svd(a).unwrap();
+                let k = rows.min(columns);
+                assert_eq!((u.dim(), s.len(), vt.dim()), ((rows, k), k, (k, columns)));
+                assert!(s.windows(2).into_iter().all(|pair| pair[0] >= pair[1]));
+                assert_abs_diff_eq!((&u * &s).dot(&vt), a, epsilon = 1e-12);
+                assert_abs_diff_eq!(u.t().dot(&u), Array2::eye(k), epsilon = 1e-12);
+                assert_abs_diff_eq!(vt.dot(&vt.t()), Array2::eye(k), epsilon = 1e-12);
+                assert_abs_diff_eq!(f64::singular_values(a).unwrap(), s, epsilon = 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn triangularise_keeps_norms_and_normal_equations() {
+        for (rows, columns) in [(1, 1), (5, 5), (40, 7), (600, 60)] {
+            let (a, b) = (random(rows, columns, 3), random(rows, 4, 4));
+            let Triangular { r, qtb, unreached } = f64::triangularise(a.view(), b.view()).unwrap();
+            for ((i, j), &value) in r.indexed_iter() {
+                assert!(i <= j || value == 0.0, "below the diagonal");
+            }
+            assert_abs_diff_eq!(r.t().dot(&r), a.t().dot(&a), epsilon = 1e-11);
+            assert_abs_diff_eq!(r.t().dot(&qtb), a.t().dot(&b), epsilon = 1e-11);
+            let reached = (&qtb * &qtb).sum_axis(Axis(0));
+            assert_abs_diff_eq!(
+                reached + unreached,
+                (&b * &b).sum_axis(Axis(0)),
+                epsilon = 1e-10
+            );
+        }
+    }
+
+    #[test]
+    fn square_and_positive_systems_are_solved() {
+        for n in [1, 2, 9, 64, 150] {
+            let (a, x) = (
+                random(n, n, 5) + Array2::<f64>::eye(n) * 4.0 * (n as f64).sqrt(),
+                random(n, 3, 6),
+            );
+            assert_abs_diff_eq!(
+                f64::solve_square(a.view(), a.dot(&x).view()).unwrap(),
+                x,
+                epsilon = 1e-10
+            );
+            let p = a.t().dot(&a);
+            assert_abs_diff_eq!(
+                f64::solve_positive(p.view(), p.dot(&x).view()).unwrap(),
+                x,
+                epsilon = 1e-9
+            );
+        }
+    }
+
+    #[test]
+    fn an_indefinite_matrix_has_no_cholesky_factor() {
+        let a: Array2<f64> = array![[1.0, 2.0], [2.0, 1.0]];
+        assert_eq!(
+            f64::solve_positive(a.view(), a.view()).unwrap_err(),
+            Failure::Pivot
+        );
+    }
+
+    #[test]
+    fn single_precision_agrees_with_double() {
+        let a = random(50, 20, 7);
+        let single = f32::svd(a.mapv(|v| v as f32).view()).unwrap();
+        assert_abs_diff_eq!(
+            single.s.mapv(Scalar::as_f64),
+            f64::svd(a.view()).unwrap().s,
+            epsilon = 1e-4
+        );
+    }
+}

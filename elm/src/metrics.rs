@@ -1,0 +1,123 @@
+//! Measures of error between a prediction and the truth.
+
+use ndarray::ArrayRef1;
+
+use crate::error::{Error, Result};
+use crate::scalar::Scalar;
+
+/// Root mean squared error.
+///
+/// # Errors
+/// [`Error::Shape`] when the lengths differ, [`Error::Empty`] when there is nothing to compare.
+pub fn rmse<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<f64> {
+    check(predicted, truth)?;
+    let squares = pairs(predicted, truth)
+        .map(|(p, t)| (p - t).powi(2))
+        .sum::<f64>();
+    Ok((squares / truth.len() as f64).sqrt())
+}
+
+/// Mean absolute error.
+///
+/// # Errors
+/// [`Error::Shape`] when the lengths differ, [`Error::Empty`] when there is nothing to compare.
+pub fn mae<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<f64> {
+    check(predicted, truth)?;
+    Ok(pairs(predicted, truth)
+        .map(|(p, t)| (p - t).abs())
+        .sum::<f64>()
+        / truth.len() as f64)
+}
+
+/// Pearson's correlation coefficient; `None` where it does not exist, that is, where one of the
+/// two is constant (to rounding).
+///
+/// # Errors
+/// [`Error::Shape`] when the lengths differ, [`Error::Empty`] when there is nothing to compare.
+pub fn correlation<A: Scalar>(
+    predicted: &ArrayRef1<A>,
+    truth: &ArrayRef1<A>,
+) -> Result<Option<f64>> {
+    check(predicted, truth)?;
+    let n = truth.len() as f64;
+    let mean = |x: &ArrayRef1<A>| x.iter().map(|v| v.as_f64()).sum::<f64>() / n;
+    let (mean_p, mean_t) = (mean(predicted), mean(truth));
+    let (mut pp, mut tt, mut pt) = (0.0, 0.0, 0.0);
+    for (p, t) in pairs(predicted, truth) {
+        let (p, t) = (p - mean_p, t - mean_t);
+        pp += p * p;
+        tt += t * t;
+        pt += p * t;
+    }
+    // The mean of n equal numbers is exact to n roundings; a spread below that is no spread.
+    let is_constant = |squares: f64, mean: f64| squares.sqrt() <= n * f64::EPSILON * mean.abs();
+    if is_constant(pp, mean_p) || is_constant(tt, mean_t) {
+        return Ok(None);
+    }
+    Ok(Some((pt / (pp.sqrt() * tt.sqrt())).clamp(-1.0, 1.0)))
+}
+
+fn check<A>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<()> {
+    if predicted.len() != truth.len() {
+        return Err(Error::Shape {
+            what: "predictions",
+            expected: truth.len(),
+            found: predicted.len(),
+        });
+    }
+    if truth.is_empty() {
+        return Err(Error::Empty {
+            what: "truth",
+            rows: 0,
+            columns: 1,
+        });
+    }
+    Ok(())
+}
+
+fn pairs<A: Scalar>(
+    predicted: &ArrayRef1<A>,
+    truth: &ArrayRef1<A>,
+) -> impl Iterator<Item = (f64, f64)> {
+    predicted
+        .iter()
+        .zip(truth)
+        .map(|(p, t)| (p.as_f64(), t.as_f64()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::{Array1, array};
+
+    #[test]
+    fn errors_of_a_hand_computed_case() {
+        let (p, t) = (array![1.0, 2.0, 3.0, 4.0], array![1.0, 0.0, 3.0, 8.0]);
+        assert_eq!(rmse(&p, &t).unwrap(), 5.0_f64.sqrt());
+        assert_eq!(mae(&p, &t).unwrap(), 1.5);
+        // Deviations (-1.5, -0.5, 0.5, 1.5) and (-2, -3, 0, 5): 12 / sqrt(5 * 38).
+        let r = correlation(&p, &t).unwrap().unwrap();
+        approx::assert_relative_eq!(r, 12.0 / 190.0_f64.sqrt(), max_relative = 1e-15);
+    }
+
+    #[test]
+    fn a_constant_has_no_correlation() {
+        let (constant, t) = (Array1::from_elem(7, 0.1), Array1::linspace(0.0, 1.0, 7));
+        assert_eq!(correlation(&constant, &t).unwrap(), None);
+        assert_eq!(correlation(&t, &constant).unwrap(), None);
+    }
+
+    #[test]
+    fn lengths_must_agree_and_not_be_zero() {
+        let (short, long, none) = (array![1.0], array![1.0, 2.0], Array1::<f64>::zeros(0));
+        assert!(matches!(
+            rmse(&short, &long),
+            Err(Error::Shape {
+                expected: 2,
+                found: 1,
+                ..
+            })
+        ));
+        assert!(matches!(mae(&none, &none), Err(Error::Empty { .. })));
+    }
+}

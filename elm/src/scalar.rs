@@ -1,0 +1,45 @@
+//! The floating-point types that a network can be made of.
+
+use std::iter::Sum;
+
+use ndarray::NdFloat;
+use serde::{Serialize, de::DeserializeOwned};
+
+use crate::linalg::Kernel;
+
+/// `f32` or `f64`. Sealed: the linear algebra behind it exists for these two.
+pub trait Scalar: NdFloat + Kernel + Sum + Serialize + DeserializeOwned {
+    /// The type's name, `"f32"` or `"f64"`.
+    const NAME: &'static str;
+
+    /// The nearest value of this type (infinite when out of range).
+    fn from_f64(value: f64) -> Self;
+
+    /// This value as `f64`; exact.
+    fn as_f64(self) -> f64;
+}
+
+impl Scalar for f32 {
+    const NAME: &'static str = "f32";
+
+    #[allow(clippy::cast_possible_truncation)]
+    fn from_f64(value: f64) -> Self {
+        value as f32
+    }
+
+    fn as_f64(self) -> f64 {
+        f64::from(self)
+    }
+}
+
+impl Scalar for f64 {
+    const NAME: &'static str = "f64";
+
+    fn from_f64(value: f64) -> Self {
+        value
+    }
+
+    fn as_f64(self) -> f64 {
+        self
+    }
+}

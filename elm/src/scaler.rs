@@ -1,0 +1,120 @@
+//! Standardisation of inputs: mean 0 and standard deviation 1 over the training rows.
+
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Zip};
+use serde::{Deserialize, Serialize};
+
+use crate::scalar::Scalar;
+
+/// Subtracts each input's mean and divides by its standard deviation (with divisor $n$).
+///
+/// An input that is constant over the training rows carries no information and is mapped to 0,
+/// whatever value it takes later.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Scaler<A: Scalar> {
+    mean: Array1<A>,
+    /// 1 / standard deviation; 0 for a constant input.
+    factor: Array1<A>,
+}
+
+impl<A: Scalar> Scaler<A> {
+    /// Measures the columns of `x`, shape (rows, inputs), which must be finite and not empty.
+    pub(crate) fn measure(x: ArrayView2<'_, A>) -> Self {
+        let (mean, factor): (Vec<_>, Vec<_>) = x.columns().into_iter().map(mean_and_factor).unzip();
+        Self {
+            mean: mean.into(),
+            factor: factor.into(),
+        }
+    }
+
+    /// The standardised inputs, shape (rows, inputs).
+    pub(crate) fn transform(&self, x: ArrayView2<'_, A>) -> Array2<A> {
+        let mut out = x.to_owned();
+        for mut row in out.rows_mut() {
+            Zip::from(&mut row)
+                .and(&self.mean)
+                .and(&self.factor)
+                .for_each(|x, &mean, &factor| {
+                    *x = if factor == A::zero() {
+                        A::zero()
+                    } else {
+                        (*x - mean) * factor
+                    };
+                });
+        }
+        out
+    }
+
+    /// Mean of each input.
+    #[must_use]
+    pub fn mean(&self) -> ArrayView1<'_, A> {
+        self.mean.view()
+    }
+
+    /// What each centred input is multiplied by; 0 for an input that was constant.
+    #[must_use]
+    pub fn factor(&self) -> ArrayView1<'_, A> {
+        self.factor.view()
+    }
+}
+
+/// Both computed on the column divided by its largest magnitude, so that neither 1e300 nor 1e-300
+/// leaves the range of the type when squared.
+fn mean_and_factor<A: Scalar>(column: ArrayView1<'_, A>) -> (A, A) {
+    let largest = column.iter().fold(A::zero(), |m, x| m.max(x.abs()));
+    if largest == A::zero() {
+        return (A::zero(), A::zero());
+    }
+    // Division, not multiplication by 1 / largest: that is infinite for a subnormal.
+    let n = A::from_f64(column.len() as f64);
+    let mean = column.iter().map(|&x| x / largest).sum::<A>() / n;
+    let variance = column
+        .iter()
+        .map(|&x| (x / largest - mean).powi(2))
+        .sum::<A>()
+        / n;
+    let deviation = variance.sqrt();
+    // Below this the spread is rounding of a constant.
+    let constant = deviation <= A::from_f64(8.0) * A::epsilon() * mean.abs();
+    let factor = A::one() / (deviation * largest);
+    if constant || !factor.is_finite() {
+        (mean * largest, A::zero())
+    } else {
+        (mean * largest, factor)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+
+    #[test]
+    fn columns_get_mean_zero_and_deviation_one() {
+        let x = array![[1.0, -5.0], [2.0, 5.0], [6.0, 15.0]];
+        let z = Scaler::measure(x.view()).transform(x.view());
+        for column in z.columns() {
+            approx::assert_abs_diff_eq!(column.sum(), 0.0, epsilon = 1e-14);
+            approx::assert_abs_diff_eq!(column.mapv(|v| v * v).sum(), 3.0, epsilon = 1e-13);
+        }
+    }
+
+    #[test]
+    fn scaling_a_column_by_any_power_of_ten_changes_nothing() {
+        let x = array![[1.0], [2.0], [6.0], [-3.0]];
+        let z = Scaler::measure(x.view()).transform(x.view());
+        for power in [-300, -150, -8, 6, 150, 300] {
+            let scaled = x.mapv(|v: f64| v * 10.0_f64.powi(power));
+            let again = Scaler::measure(scaled.view()).transform(scaled.view());
+            approx::assert_abs_diff_eq!(again, z, epsilon = 1e-13);
+        }
+    }
+
+    #[test]
+    fn a_constant_column_is_ignored_even_where_it_later_changes() {
+        let x = array![[0.1, 1.0], [0.1, 2.0], [0.1, 3.0]];
+        let scaler = Scaler::<f64>::measure(x.view());
+        let z = scaler.transform(array![[1e9, 2.0]].view());
+        assert_eq!(z[[0, 0]], 0.0);
+    }
+}

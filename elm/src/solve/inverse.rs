@@ -1,0 +1,83 @@
+//! Equation 10: $\beta = H^{-1} T$ for square $H$.
+
+use ndarray::{Array1, Axis};
+use serde::{Deserialize, Serialize};
+
+use super::spectrum::rounding;
+use super::{Diagnosis, LeastSquares, Route, Solution};
+use crate::error::{Error, Result};
+use crate::linalg::Failure;
+use crate::scalar::Scalar;
+
+/// Solves $H\beta = T$ exactly by LU with partial pivoting. Needs as many neurons as rows, and
+/// takes neither an intercept (there would be more unknowns than equations) nor row weights (an
+/// exact answer leaves nothing to weigh).
+///
+/// The network passes through every training target, noise included; it exists to reproduce
+/// equation 10. For square, well-conditioned $H$ it agrees with
+/// [`PseudoInverse`](super::PseudoInverse).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Inverse;
+
+impl Inverse {
+    pub(super) fn solve<A: Scalar>(self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
+        if problem.intercept {
+            return Err(Error::Conflict {
+                first: "the solver 'inverse'",
+                second: "an intercept",
+            });
+        }
+        if problem.weights.is_some() {
+            return Err(Error::Conflict {
+                first: "the solver 'inverse'",
+                second: "row weights",
+            });
+        }
+        let (rows, neurons) = problem.hidden.dim();
+        if rows != neurons {
+            return Err(Error::NotSquare { rows, neurons });
+        }
+        let s = A::singular_values(problem.hidden)?;
+        let (largest, smallest) = (s[0], s[s.len() - 1]);
+        let singular = |reciprocal_condition| Error::Singular {
+            reciprocal_condition,
+        };
+        if smallest <= rounding::<A>(rows, neurons) * largest {
+            let ratio = if largest > A::zero() {
+                smallest / largest
+            } else {
+                A::zero()
+            };
+            return Err(singular(ratio.as_f64()));
+        }
+        let beta = match A::solve_square(problem.hidden, problem.targets) {
+            Ok(beta) => beta,
+            Err(Failure::Pivot) => return Err(singular((smallest / largest).as_f64())),
+            Err(failure) => return Err(failure.into()),
+        };
+        let outputs = problem.outputs();
+        let residual = &problem.targets - &A::product(problem.hidden, beta.view());
+        let norms = |matrix: &ndarray::Array2<A>| {
+            matrix
+                .map_axis(Axis(0), |column| column.dot(&column).sqrt().as_f64())
+                .to_vec()
+        };
+        let diagnosis = Diagnosis {
+            route: Route::Lu,
+            rank: neurons,
+            condition: (largest / smallest).as_f64(),
+            largest_singular_value: largest.as_f64(),
+            smallest_singular_value: smallest.as_f64(),
+            lambda: vec![0.0; outputs],
+            degrees_of_freedom: vec![neurons as f64; outputs],
+            residual_norm: norms(&residual),
+            beta_norm: norms(&beta),
+            leave_one_out: None,
+        };
+        Ok(Solution {
+            beta,
+            intercept: Array1::zeros(outputs),
+            diagnosis,
+        })
+    }
+}

@@ -1,0 +1,268 @@
+//! The one linear solve: output weights $\beta$ with $H\beta \approx T$ (equation 9).
+//!
+//! | solver | equation | for |
+//! |---|---|---|
+//! | [`Inverse`] | 10, $\beta = H^{-1}T$ | as many neurons as rows, the paper's special case |
+//! | [`PseudoInverse`] | 11, $\beta = H^{+}T$ | the paper's general case: least squares, minimum norm |
+//! | [`Ridge`] | $\beta = \arg\min \lVert H\beta - T\rVert^2 + \lambda\lVert\beta\rVert^2$ | everything else; the default |
+//!
+//! All take any number of outputs (columns of $T$) and answer them from one factorisation. Each
+//! returns a [`Diagnosis`] beside the weights. A [`LeastSquares`] problem can be solved without a
+//! network around it:
+//!
+//! ```
+//! use elm::solve::{LeastSquares, PseudoInverse, Solver};
+//! use ndarray::array;
+//!
+//! let h = array![[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]];
+//! let t = array![[1.0], [3.0], [5.0]];
+//! let solution = Solver::from(PseudoInverse::default()).solve(&LeastSquares::new(&h, &t)?)?;
+//! assert!((solution.beta[[0, 0]] - 1.0_f64).abs() < 1e-12);
+//! assert!((solution.beta[[1, 0]] - 2.0_f64).abs() < 1e-12);
+//! assert_eq!(solution.diagnosis.rank, 2);
+//! # Ok::<(), elm::Error>(())
+//! ```
+
+mod diagnosis;
+mod inverse;
+mod pseudo_inverse;
+mod ridge;
+pub(crate) mod spectrum;
+
+use std::fmt;
+
+use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+use crate::linalg::Failure;
+use crate::scalar::Scalar;
+
+pub use diagnosis::{Diagnosis, Route};
+pub use inverse::Inverse;
+pub use pseudo_inverse::PseudoInverse;
+pub use ridge::{Lambda, Ridge};
+
+/// The problem $H\beta \approx T$: checked shapes, finite entries.
+#[derive(Debug, Clone)]
+pub struct LeastSquares<'a, A: Scalar> {
+    hidden: ArrayView2<'a, A>,
+    targets: ArrayView2<'a, A>,
+    weights: Option<ArrayView1<'a, A>>,
+    intercept: bool,
+}
+
+impl<'a, A: Scalar> LeastSquares<'a, A> {
+    /// `hidden` has shape (rows, neurons), `targets` (rows, outputs).
+    ///
+    /// # Errors
+    /// [`Error::Empty`] when either has no rows or no columns, [`Error::Shape`] when their rows
+    /// differ, [`Error::NotFinite`] at the first NaN or infinity.
+    pub fn new(hidden: &'a ArrayRef2<A>, targets: &'a ArrayRef2<A>) -> Result<Self> {
+        let (hidden, targets) = (hidden.view(), targets.view());
+        check_matrix("hidden-layer matrix", hidden)?;
+        check_matrix("targets", targets)?;
+        check_length("rows of targets", targets.nrows(), hidden.nrows())?;
+        Ok(Self {
+            hidden,
+            targets,
+            weights: None,
+            intercept: false,
+        })
+    }
+
+    /// Weighs the squared residual of each row; by default all weights are 1.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] when there is not one weight per row, [`Error::Parameter`] when one is
+    /// negative or not finite or when all are 0.
+    pub fn weights(mut self, weights: &'a ArrayRef1<A>) -> Result<Self> {
+        check_length("row weights", weights.len(), self.hidden.nrows())?;
+        if let Some(bad) = weights
+            .iter()
+            .find(|w| !(**w >= A::zero() && w.is_finite()))
+        {
+            return Err(weight_error(bad.as_f64()));
+        }
+        if weights.iter().all(|w| *w == A::zero()) {
+            return Err(weight_error(0.0));
+        }
+        self.weights = Some(weights.view());
+        Ok(self)
+    }
+
+    /// Adds a constant to each output that no solver penalises; off by default.
+    #[must_use]
+    pub fn intercept(mut self, intercept: bool) -> Self {
+        self.intercept = intercept;
+        self
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.hidden.nrows()
+    }
+
+    /// Number of columns of the hidden-layer matrix.
+    #[must_use]
+    pub fn neurons(&self) -> usize {
+        self.hidden.ncols()
+    }
+
+    /// Number of columns of the targets.
+    #[must_use]
+    pub fn outputs(&self) -> usize {
+        self.targets.ncols()
+    }
+}
+
+fn weight_error(value: f64) -> Error {
+    Error::Parameter {
+        name: "row weight",
+        value,
+        expected: "finite, not negative, not all zero",
+    }
+}
+
+/// What a solver found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution<A: Scalar> {
+    /// Output weights, shape (neurons, outputs).
+    pub beta: Array2<A>,
+    /// The constant added to each output; all 0 without an intercept.
+    pub intercept: Array1<A>,
+    /// What the solver saw on its way.
+    pub diagnosis: Diagnosis,
+}
+
+/// One of the solvers, with its settings.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Solver {
+    /// Equation 10.
+    Inverse(Inverse),
+    /// Equation 11.
+    PseudoInverse(PseudoInverse),
+    /// Regularised least squares.
+    Ridge(Ridge),
+}
+
+impl Solver {
+    /// Solves the problem.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a setting out of range; [`Error::NotSquare`],
+    /// [`Error::Singular`] and [`Error::Conflict`] from [`Inverse`]; [`Error::Overflow`] when the
+    /// answer does not fit the type; [`Error::NoConvergence`] from the factorisation.
+    pub fn solve<A: Scalar>(&self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
+        self.check()?;
+        let solution = match self {
+            Self::Inverse(solver) => solver.solve(problem),
+            Self::PseudoInverse(solver) => solver.solve(problem),
+            Self::Ridge(solver) => solver.solve(problem),
+        }?;
+        let finite = |x: &A| x.is_finite();
+        if !(solution.beta.iter().all(finite) && solution.intercept.iter().all(finite)) {
+            return Err(Error::Overflow {
+                what: "an output weight",
+            });
+        }
+        Ok(solution)
+    }
+
+    /// Whether the settings are in range.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the first that is not.
+    pub fn check(&self) -> Result<()> {
+        match self {
+            Self::Inverse(_) => Ok(()),
+            Self::PseudoInverse(solver) => solver.check(),
+            Self::Ridge(solver) => solver.check(),
+        }
+    }
+
+    /// The solver's name: `inverse`, `pseudo-inverse` or `ridge`.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Inverse(_) => "inverse",
+            Self::PseudoInverse(_) => "pseudo-inverse",
+            Self::Ridge(_) => "ridge",
+        }
+    }
+}
+
+impl Default for Solver {
+    /// Ridge, its strength chosen by leave-one-out.
+    fn default() -> Self {
+        Self::Ridge(Ridge::default())
+    }
+}
+
+impl fmt::Display for Solver {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl From<Inverse> for Solver {
+    fn from(solver: Inverse) -> Self {
+        Self::Inverse(solver)
+    }
+}
+
+impl From<PseudoInverse> for Solver {
+    fn from(solver: PseudoInverse) -> Self {
+        Self::PseudoInverse(solver)
+    }
+}
+
+impl From<Ridge> for Solver {
+    fn from(solver: Ridge) -> Self {
+        Self::Ridge(solver)
+    }
+}
+
+/// Not empty, and finite everywhere.
+pub(crate) fn check_matrix<A: Scalar>(what: &'static str, a: ArrayView2<'_, A>) -> Result<()> {
+    let (rows, columns) = a.dim();
+    if a.is_empty() {
+        return Err(Error::Empty {
+            what,
+            rows,
+            columns,
+        });
+    }
+    match a.indexed_iter().find(|(_, value)| !value.is_finite()) {
+        Some(((row, column), _)) => Err(Error::NotFinite { what, row, column }),
+        None => Ok(()),
+    }
+}
+
+pub(crate) fn check_length(what: &'static str, found: usize, expected: usize) -> Result<()> {
+    if found == expected {
+        Ok(())
+    } else {
+        Err(Error::Shape {
+            what,
+            expected,
+            found,
+        })
+    }
+}
+
+impl From<Failure> for Error {
+    fn from(failure: Failure) -> Self {
+        match failure {
+            Failure::NoConvergence => Self::NoConvergence {
+                what: "the singular value decomposition",
+            },
+            Failure::Pivot => Self::Singular {
+                reciprocal_condition: 0.0,
+            },
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! Equation 11: $\beta = H^{+} T$ with the Moore-Penrose generalised inverse.
+
+use ndarray::{Array2, Axis};
+use serde::{Deserialize, Serialize};
+
+use super::spectrum::{Spectrum, rounding};
+use super::{LeastSquares, Solution};
+use crate::error::{Error, Result};
+use crate::scalar::Scalar;
+
+/// The least-squares solution of minimum norm, by singular values.
+///
+/// Directions whose singular value is at most `cutoff` times the largest are left out. Without a
+/// cut-off of one's own only those at the level of rounding error are, which is the paper's plain
+/// pseudo-inverse: it amplifies whatever noise the smallest kept directions carry, so prefer
+/// [`Ridge`](super::Ridge) unless equation 11 itself is wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct PseudoInverse {
+    cutoff: Option<f64>,
+}
+
+impl PseudoInverse {
+    /// With a cut-off relative to the largest singular value, in $[0, 1)$. One below the rounding
+    /// level of the matrix (about $4 \epsilon \sqrt{\max(\text{rows}, \text{neurons})}$) has the
+    /// effect of that level.
+    #[must_use]
+    pub fn with_cutoff(cutoff: f64) -> Self {
+        Self {
+            cutoff: Some(cutoff),
+        }
+    }
+
+    pub(super) fn check(&self) -> Result<()> {
+        match self.cutoff {
+            Some(value) if !(0.0..1.0).contains(&value) => Err(Error::Parameter {
+                name: "cutoff",
+                value,
+                expected: "at least 0 and below 1",
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    pub(super) fn solve<A: Scalar>(self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
+        let spectrum = Spectrum::new(problem)?;
+        let level = rounding::<A>(problem.rows(), problem.neurons());
+        let cutoff = self
+            .cutoff
+            .map_or(level, |cutoff| A::from_f64(cutoff).max(level));
+        let rank = spectrum.rank(cutoff);
+        let gain = Array2::from_shape_fn((spectrum.s.len(), 1), |(j, _)| {
+            if j < rank {
+                A::one() / spectrum.s[j]
+            } else {
+                A::zero()
+            }
+        });
+        let lambda = vec![0.0; spectrum.c.len_of(Axis(1))];
+        Ok(spectrum.solution(&gain, cutoff, lambda, None))
+    }
+}
