@@ -15,6 +15,8 @@
 
 mod names;
 mod parse;
+pub mod rig;
+mod write;
 
 use std::fs;
 use std::path::Path;
@@ -22,6 +24,7 @@ use std::path::Path;
 use ndarray::{Array2, ArrayViewMut1};
 
 pub use names::{MATERIALS, MaterialId, NAMES};
+pub use write::write;
 
 use crate::Error;
 use crate::measurements::{Invalid, Material, Measurements, Origin};
