@@ -2,10 +2,12 @@
 
 #![forbid(unsafe_code)]
 
+pub mod analytic;
 pub mod curet;
 pub mod error;
 pub mod measurements;
 pub mod samples;
+pub mod synthetic;
 
 pub use curet::MaterialId;
 pub use error::Error;

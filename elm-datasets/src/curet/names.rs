@@ -78,9 +78,9 @@ impl MaterialId {
     /// Finds a material by its number, or by its name among `names`.
     ///
     /// Only letters and digits count, and case does not: "human-skin" finds "Human Skin".
-    pub(crate) fn find(
+    pub(crate) fn find<S: AsRef<str>>(
         text: &str,
-        names: &[&'static str; MATERIALS],
+        names: &'static [S],
         aliases: &[(&str, usize)],
     ) -> Result<Self, Error> {
         if let Ok(number) = text.trim().parse::<usize>() {
@@ -91,14 +91,19 @@ impl MaterialId {
             .iter()
             .find(|(alias, _)| *alias == wanted)
             .map(|&(_, number)| number);
-        let exact = Self::all().find(|id| plain(names[id.index()]) == wanted);
-        if let Some(id) = exact.or_else(|| alias.and_then(|number| Self::new(number).ok())) {
+        let exact = Self::all()
+            .zip(names)
+            .find(|(_, name)| plain(name.as_ref()) == wanted);
+        if let Some(id) = exact
+            .map(|(id, _)| id)
+            .or_else(|| alias.and_then(|number| Self::new(number).ok()))
+        {
             return Ok(id);
         }
         let name = shorten(text);
         let candidates: Vec<_> = names
             .iter()
-            .copied()
+            .map(AsRef::as_ref)
             .filter(|candidate| !wanted.is_empty() && plain(candidate).starts_with(&wanted))
             .collect();
         if candidates.len() > 1 {
@@ -156,12 +161,13 @@ fn plain(name: &str) -> String {
 }
 
 /// The three names with the smallest edit distance, relative to length.
-fn closest(wanted: &str, names: &[&'static str; MATERIALS]) -> Vec<&'static str> {
+fn closest<S: AsRef<str>>(wanted: &str, names: &'static [S]) -> Vec<&'static str> {
     // The distance costs the product of both lengths, and no name is longer than this.
     let wanted: String = wanted.chars().take(32).collect();
-    let mut ranked: Vec<_> = names
+    let mut ranked: Vec<(f64, &str)> = names
         .iter()
-        .map(|&name| {
+        .map(AsRef::as_ref)
+        .map(|name| {
             (
                 strsim::normalized_damerau_levenshtein(&wanted, &plain(name)),
                 name,
