@@ -1,0 +1,365 @@
+//! What can go wrong between a file or a name and an array of numbers.
+
+use std::fmt;
+use std::path::PathBuf;
+
+/// What a numbered line of a CUReT file describes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Entry {
+    /// One of the materials, a line of a value file.
+    Material,
+    /// One of the pairs of directions, a line of `table.txt`.
+    Measurement,
+}
+
+impl fmt::Display for Entry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Material => "material",
+            Self::Measurement => "measurement",
+        })
+    }
+}
+
+/// Everything that reading, writing and looking up data can fail with.
+///
+/// The text of each variant is one line that names the place and what was expected there; an
+/// input/output error's own text is part of it, so there is no further source to print.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file could not be opened or read.
+    #[error("cannot read {}: {reason}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        reason: std::io::Error,
+    },
+    /// A file could not be written or moved into place.
+    #[error("cannot write {}: {reason}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        reason: std::io::Error,
+    },
+    /// A folder holds no complete set of CUReT value files.
+    #[error(
+        "{} has no complete set of values: looked for abrdf.dat, or rbrdf.dat with gbrdf.dat and \
+         bbrdf.dat; found {}",
+        dir.display(),
+        none_or_list(found)
+    )]
+    NoValues {
+        /// The folder.
+        dir: PathBuf,
+        /// The value files that are there.
+        found: Vec<&'static str>,
+    },
+    /// Bytes that are not UTF-8.
+    #[error("{}, line {line}: expected text in UTF-8, found other bytes", path.display())]
+    NotUtf8 {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: usize,
+    },
+    /// A line with too few or too many numbers.
+    #[error("{}, line {line}: expected {expected} numbers, found {found}", path.display())]
+    Count {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: usize,
+        /// How many there are.
+        found: usize,
+        /// How many there must be.
+        expected: usize,
+    },
+    /// A text that is not a finite number.
+    #[error(
+        "{}, line {line}, {}: expected a finite number, found {text:?}",
+        path.display(),
+        column_text(column)
+    )]
+    NotANumber {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: usize,
+        /// Where in the line.
+        column: Column,
+        /// What stands there, shortened if long.
+        text: String,
+    },
+    /// A line that does not begin with a number in range.
+    #[error(
+        "{}, line {line}: expected the number of a {entry} (1 to {last}), found {text:?}",
+        path.display()
+    )]
+    EntryNumber {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: usize,
+        /// What the lines of this file describe.
+        entry: Entry,
+        /// The largest number that exists.
+        last: usize,
+        /// What stands there, shortened if long.
+        text: String,
+    },
+    /// The same number on two lines.
+    #[error(
+        "{}, line {line}: {entry} {number} has a line already, line {first}; expected each once",
+        path.display()
+    )]
+    DuplicateEntry {
+        /// The file.
+        path: PathBuf,
+        /// Line of the second, counted from 1.
+        line: usize,
+        /// Line of the first, counted from 1.
+        first: usize,
+        /// What the lines of this file describe.
+        entry: Entry,
+        /// The number met twice.
+        number: usize,
+    },
+    /// A number without a line.
+    #[error(
+        "{}: {entry} {number} is missing after the last line, line {lines}; expected each of 1 to \
+         {last} on a line",
+        path.display()
+    )]
+    MissingEntry {
+        /// The file.
+        path: PathBuf,
+        /// What the lines of this file describe.
+        entry: Entry,
+        /// The smallest number that is missing.
+        number: usize,
+        /// The largest number that exists.
+        last: usize,
+        /// Lines in the file, blank ones at the end left out.
+        lines: usize,
+    },
+    /// An angle outside the range that has a meaning.
+    #[error(
+        "{}, line {line}: expected {angle} {expected} radians, found {value}",
+        path.display()
+    )]
+    Angle {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: usize,
+        /// Name of the angle, as in [`Directions`](crate::Directions).
+        angle: &'static str,
+        /// The value found, in radians.
+        value: f64,
+        /// The range it must be in.
+        expected: &'static str,
+    },
+    /// A material number outside 1 to 61.
+    #[error("there is no material {number}: they are numbered 1 to {last}")]
+    MaterialNumber {
+        /// The number asked for.
+        number: usize,
+        /// The largest number that exists.
+        last: usize,
+    },
+    /// A name that no material has.
+    #[error(
+        "no material is called {name:?}; the closest names are {}",
+        none_or_list(closest)
+    )]
+    UnknownMaterial {
+        /// The name asked for.
+        name: String,
+        /// The names nearest to it, nearest first.
+        closest: Vec<&'static str>,
+    },
+    /// A name that fits several materials.
+    #[error(
+        "{name:?} may mean any of {}: give the whole name or the number",
+        none_or_list(candidates)
+    )]
+    AmbiguousMaterial {
+        /// The name asked for.
+        name: String,
+        /// The names it fits.
+        candidates: Vec<&'static str>,
+    },
+    /// A text that names no way of treating invalid values.
+    #[error("{text:?} is no way to treat invalid values: expected clamp, keep or drop")]
+    UnknownInvalid {
+        /// The text.
+        text: String,
+    },
+    /// Measurements that cannot be written in CUReT's layout.
+    #[error("these measurements do not fit CUReT's files: {0}")]
+    Layout(#[from] Layout),
+    /// A malformed CSV record, or a file that broke off while it was read.
+    #[error("{}, line {line}: {reason}", path.display())]
+    Csv {
+        /// The file, or the name given to the stream.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: u64,
+        /// What the CSV reader said.
+        reason: csv::Error,
+    },
+    /// A table without a header or without rows.
+    #[error("{}: expected a header and at least one row, found {found}", path.display())]
+    EmptyTable {
+        /// The file, or the name given to the stream.
+        path: PathBuf,
+        /// What there is instead.
+        found: &'static str,
+    },
+    /// Two columns of one name.
+    #[error("{}, line {line}: expected distinct column names, found {name:?} twice", path.display())]
+    DuplicateColumn {
+        /// The file, or the name given to the stream.
+        path: PathBuf,
+        /// Line of the header, counted from 1.
+        line: u64,
+        /// The name.
+        name: String,
+    },
+    /// A column that the table does not have.
+    #[error("there is no column {name:?}; the table has {}", none_or_list(columns))]
+    UnknownColumn {
+        /// The name asked for.
+        name: String,
+        /// The names there are.
+        columns: Vec<String>,
+    },
+    /// A split that leaves no inputs or no targets.
+    #[error("expected 1 to {} target columns of {columns}, found {targets}", columns.saturating_sub(1))]
+    Split {
+        /// Target columns asked for.
+        targets: usize,
+        /// Columns of the table.
+        columns: usize,
+    },
+}
+
+/// Where in a line a number stands.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Column {
+    /// The n-th number of the line, counted from 1, the line's own number included.
+    Index(usize),
+    /// A column with a name.
+    Name(String),
+}
+
+/// Why measurements do not fit CUReT's files.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Layout {
+    /// The wrong number of directions.
+    #[error("expected {expected} pairs of directions, found {found}")]
+    Directions {
+        /// How many there are.
+        found: usize,
+        /// How many there must be.
+        expected: usize,
+    },
+    /// An angle that the reader would refuse.
+    #[error("measurement {measurement}: expected {angle} {expected} radians, found {value}")]
+    Angle {
+        /// Number of the pair of directions, counted from 1.
+        measurement: usize,
+        /// Name of the angle.
+        angle: &'static str,
+        /// The value found, in radians.
+        value: f64,
+        /// The range it must be in.
+        expected: &'static str,
+    },
+    /// Channels that have no file.
+    #[error("expected the channels average, or red, green and blue; found {}", none_or_list(.0))]
+    Channels(
+        /// The channels found.
+        Vec<String>,
+    ),
+    /// A material is not there.
+    #[error("expected all {last} materials once, found {count} of material {number}")]
+    Materials {
+        /// The first number that does not occur exactly once.
+        number: usize,
+        /// How often it occurs.
+        count: usize,
+        /// The largest number that exists.
+        last: usize,
+    },
+    /// A material without all its rows, or with values of another shape.
+    #[error(
+        "material {number}: expected values for all {expected} measurements in order, found {rows} \
+         rows and values of shape {shape:?}"
+    )]
+    Rows {
+        /// Number of the material.
+        number: usize,
+        /// Rows there are.
+        rows: usize,
+        /// Shape of the values.
+        shape: (usize, usize),
+        /// Rows there must be.
+        expected: usize,
+    },
+    /// A value that is not finite.
+    #[error("material {number}, measurement {measurement}: expected a finite value, found {value}")]
+    NotFinite {
+        /// Number of the material.
+        number: usize,
+        /// Number of the pair of directions, counted from 1.
+        measurement: usize,
+        /// The value.
+        value: f64,
+    },
+}
+
+/// The names with commas between, or "none".
+fn none_or_list<S: AsRef<str>>(names: &[S]) -> String {
+    if names.is_empty() {
+        return "none".to_owned();
+    }
+    names
+        .iter()
+        .map(AsRef::as_ref)
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+fn column_text(column: &Column) -> String {
+    match column {
+        Column::Index(index) => format!("number {index}"),
+        Column::Name(name) => format!("column {name:?}"),
+    }
+}
+
+/// A piece of a file for an error: no more than a line can hold.
+pub(crate) fn shorten(text: &str) -> String {
+    const LONGEST: usize = 32;
+    if text.chars().count() <= LONGEST {
+        return text.to_owned();
+    }
+    text.chars().take(LONGEST).chain("...".chars()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_texts_are_shortened_at_a_character_not_inside_one() {
+        assert_eq!(shorten("0.1"), "0.1");
+        assert_eq!(shorten(&"é".repeat(40)), format!("{}...", "é".repeat(32)));
+    }
+}
