@@ -1,1 +1,44 @@
-//! Scaffold.
+//! Learns measured reflectance (BRDF) with extreme learning machines, and reproduces on the CUReT
+//! database the paper
+//!
+//! > S. Kartal, *Extreme Learning Machine based Bidirectional Reflectance Distribution
+//! > Approximation*, International Journal of Advanced Research in Computer Science and Software
+//! > Engineering 7(3), 2017.
+//!
+//! Data run one way: measurements ([`elm_datasets`]) to network inputs ([`features`]) and targets
+//! ([`link`]), through a network ([`elm`]) to a reflectance model ([`model`]), which
+//! cross-validation ([`protocol`]) judges beside what the paper printed ([`published`]), as a
+//! [`report`].
+//!
+//! ```
+//! use elm::{ElmParams, solve::PseudoInverse};
+//! use elm_brdf::{features::Features, link::Link, model::BrdfParams, protocol};
+//! use elm_datasets::{Invalid, MaterialId, synthetic};
+//!
+//! let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
+//! let paper = BrdfParams {
+//!     features: Features::Paper,
+//!     link: Link::Identity,
+//!     network: ElmParams::new(50).solver(PseudoInverse::default()).intercept(false),
+//! };
+//! let folds = protocol::Folds::new(data.directions.len(), 10, 1)?;
+//! let scores = protocol::cross_validate(&paper, &data, &folds, |_, _| {})?;
+//! let red = scores[0].channels[0];
+//! assert!(red.held_out.rmse > red.train.rmse);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+#![forbid(unsafe_code)]
+
+pub mod brdf;
+pub mod cli;
+mod error;
+pub mod features;
+pub mod geometry;
+pub mod link;
+pub mod model;
+pub mod protocol;
+pub mod published;
+pub mod report;
+
+pub use error::{Error, Result};

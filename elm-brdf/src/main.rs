@@ -1,2 +1,7 @@
-//! Scaffold.
-fn main() {}
+//! The `elm-brdf` program; see [`elm_brdf::cli`].
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    elm_brdf::cli::run()
+}

@@ -30,6 +30,7 @@ mod ridge;
 pub(crate) mod spectrum;
 
 use std::fmt;
+use std::str::FromStr;
 
 use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
@@ -150,6 +151,9 @@ pub enum Solver {
 }
 
 impl Solver {
+    /// The names of the solvers, as [`FromStr`] reads them.
+    pub const NAMES: &'static str = "inverse, pseudo-inverse, ridge";
+
     /// Solves the problem.
     ///
     /// # Errors
@@ -191,6 +195,24 @@ impl Solver {
             Self::Inverse(_) => "inverse",
             Self::PseudoInverse(_) => "pseudo-inverse",
             Self::Ridge(_) => "ridge",
+        }
+    }
+}
+
+impl FromStr for Solver {
+    type Err = Error;
+
+    /// The solver of this name with its default settings.
+    fn from_str(name: &str) -> Result<Self> {
+        match name {
+            "inverse" => Ok(Inverse.into()),
+            "pseudo-inverse" => Ok(PseudoInverse::default().into()),
+            "ridge" => Ok(Ridge::default().into()),
+            _ => Err(Error::UnknownName {
+                what: "solver",
+                name: name.to_owned(),
+                expected: Self::NAMES,
+            }),
         }
     }
 }

@@ -1,0 +1,30 @@
+//! What every reflectance model here can do, and what can make one from measurements.
+
+use elm_datasets::Directions;
+use ndarray::{Array2, ArrayView2};
+
+use crate::error::Result;
+
+/// A reflectance model, possibly of several channels, or of several materials side by side.
+pub trait Brdf {
+    /// Number of values per pair of directions.
+    fn channels(&self) -> usize;
+
+    /// BRDF in 1/sr, without the cosine, at each pair of directions: shape (pairs, channels).
+    ///
+    /// # Errors
+    /// Where a value cannot be computed, such as for an angle that is not finite.
+    fn eval(&self, pairs: &[Directions]) -> Result<Array2<f64>>;
+}
+
+/// A way to make a [`Brdf`] from measurements.
+pub trait Fit {
+    /// Fits `values` (BRDF in 1/sr, shape (pairs, channels)) measured at `pairs`.
+    ///
+    /// Channels are independent of each other and may be those of many materials: what they
+    /// share, such as the factorisation of a hidden-layer matrix, is then done once.
+    ///
+    /// # Errors
+    /// Where these measurements cannot be fitted.
+    fn fit(&self, pairs: &[Directions], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>>;
+}

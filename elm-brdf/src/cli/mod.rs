@@ -1,0 +1,105 @@
+//! The command line: what was typed, checked, carried out and printed. Nothing else in this crate
+//! prints.
+
+mod data;
+mod reproduce;
+
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+use clap::error::ErrorKind;
+use clap::{Parser, Subcommand};
+
+use crate::error::Error;
+
+/// Extreme learning machines for measured reflectance.
+#[derive(Debug, Parser)]
+#[command(name = "elm-brdf", version, about, arg_required_else_help = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Reproduce(reproduce::Arguments),
+}
+
+/// Why a command ended without doing its work.
+#[derive(Debug, thiserror::Error)]
+enum Failure {
+    /// What was typed makes no sense: exit code 2.
+    #[error("{0}")]
+    Usage(String),
+    /// It made sense, and failed: exit code 1.
+    #[error(transparent)]
+    Failed(#[from] Error),
+    /// Whoever reads the output stopped reading, as `head` does: success.
+    #[error("broken pipe")]
+    BrokenPipe,
+}
+
+impl From<elm_datasets::Error> for Failure {
+    fn from(error: elm_datasets::Error) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+/// Runs the program with the arguments of the process.
+#[must_use]
+pub fn run() -> ExitCode {
+    let outcome = match Arguments::try_parse() {
+        Ok(Arguments {
+            command: Command::Reproduce(arguments),
+        }) => reproduce::run(&arguments),
+        Err(error) => explain(&error),
+    };
+    match outcome {
+        Ok(()) | Err(Failure::BrokenPipe) => ExitCode::SUCCESS,
+        Err(failure) => {
+            say(&format!("error: {failure}"));
+            ExitCode::from(if matches!(failure, Failure::Usage(_)) {
+                2
+            } else {
+                1
+            })
+        }
+    }
+}
+
+/// Help and version are results; anything else that clap has to say becomes one line.
+fn explain(error: &clap::Error) -> Result<(), Failure> {
+    match error.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => print(&error.to_string()),
+        ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => Err(Failure::Usage(
+            "a command is missing (try 'elm-brdf --help')".to_owned(),
+        )),
+        _ => {
+            let text = error.to_string();
+            let message = text.strip_prefix("error: ").unwrap_or(&text);
+            // The usage and the pointer to --help follow after an empty line.
+            let first = message.split("\n\n").next().unwrap_or(message);
+            let line = first.split_whitespace().collect::<Vec<_>>().join(" ");
+            Err(Failure::Usage(format!("{line} (try 'elm-brdf --help')")))
+        }
+    }
+}
+
+/// Prints a result.
+fn print(text: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Ok(()) => Ok(()),
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Err(Failure::BrokenPipe),
+        Err(reason) => Err(Failure::Failed(Error::Write {
+            path: "standard output".into(),
+            reason,
+        })),
+    }
+}
+
+/// Says something that is not a result.
+fn say(line: &str) {
+    // With standard error closed there is nobody left to tell.
+    let _ = writeln!(io::stderr().lock(), "{line}");
+}

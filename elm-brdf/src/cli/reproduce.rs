@@ -1,0 +1,155 @@
+//! `elm-brdf reproduce`: the paper's Tables I to III, recomputed.
+
+use std::io::{self, IsTerminal};
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Instant;
+
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use elm::solve::Solver;
+use elm::{Activation, ElmParams};
+use elm_datasets::Invalid;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::data::{self, Source};
+use super::{Failure, print, say};
+use crate::error::Error;
+use crate::features::Features;
+use crate::link::Link;
+use crate::model::BrdfParams;
+use crate::protocol::{Folds, cross_validate};
+use crate::report::{Format, Protocol, Report, Seconds};
+
+/// Recompute the paper's Tables I to III by cross-validation, beside what the paper printed.
+///
+/// Measurements are looked for in --data, then in the folder that ELM_BRDF_DATA names, then in
+/// this program's folder in the user's cache; with none of them the built-in synthetic stand-in
+/// is used, and the output says so.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Folder of CUReT files: table.txt with abrdf.dat, or with rbrdf.dat, gbrdf.dat and
+    /// bbrdf.dat.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// 'paper', 'all', or a list of numbers and names, such as '1,39,orange peel'.
+    #[arg(long, value_name = "LIST", default_value = "paper")]
+    materials: String,
+    /// Number of folds, at least 2.
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    folds: usize,
+    /// Seed of the random layer and of the folds.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Hidden neurons, at least 1.
+    #[arg(long, value_name = "N", default_value_t = 50)]
+    neurons: usize,
+    /// Activation function of the hidden neurons.
+    #[arg(long, value_name = "NAME", default_value = "sigmoid",
+          value_parser = one_of::<Activation<f64>>(Activation::<f64>::NAMES.split(", ")))]
+    activation: Activation<f64>,
+    /// Solver of the output weights: eq. 10 (needs as many neurons as training rows), eq. 11, or
+    /// ridge with its strength chosen by leave-one-out on the training rows.
+    #[arg(long, value_name = "NAME", default_value = "pseudo-inverse",
+          value_parser = one_of::<Solver>(Solver::NAMES.split(", ")))]
+    solver: Solver,
+    /// Form of the output.
+    #[arg(long, value_name = "FORM", default_value = "table",
+          value_parser = one_of::<Format>(Format::ALL.map(Format::name)))]
+    format: Format,
+    /// Also write every form to this folder, as reproduce.txt, .md, .csv and .json.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// What to do with negative BRDF values: set them to 0, keep them, or drop the measurement.
+    #[arg(long, value_name = "WAY", default_value = "clamp",
+          value_parser = one_of::<Invalid>(Invalid::ALL.map(Invalid::name)))]
+    invalid: Invalid,
+}
+
+/// Reads one of `names`, and lists them in the help and in the error.
+fn one_of<T>(names: impl IntoIterator<Item = &'static str>) -> impl TypedValueParser<Value = T>
+where
+    T: FromStr<Err: std::error::Error + Send + Sync + 'static> + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(names).try_map(|name| name.parse())
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let start = Instant::now();
+    let usage = |error: &dyn std::fmt::Display| Failure::Usage(error.to_string());
+    let network = ElmParams::new(arguments.neurons)
+        .activation(arguments.activation.clone())
+        .solver(arguments.solver)
+        // Equation 7 has no constant term.
+        .intercept(false)
+        .seed(arguments.seed);
+    network.clone().check().map_err(|error| usage(&error))?;
+
+    let source = Source::find(arguments.data.as_deref())?;
+    let materials = source.select(&arguments.materials)?;
+    let data = source.load(&materials, arguments.invalid)?;
+    let load = start.elapsed().as_secs_f64();
+
+    let folds = Folds::new(data.directions.len(), arguments.folds, arguments.seed)
+        .map_err(|error| usage(&error))?;
+    let params = BrdfParams {
+        features: Features::Paper,
+        link: Link::Identity,
+        network,
+    };
+    let protocol = Protocol {
+        model: "paper".to_owned(),
+        features: params.features.name().to_owned(),
+        target: params.link.name().to_owned(),
+        neurons: arguments.neurons,
+        activation: arguments.activation.name().to_owned(),
+        solver: arguments.solver.name().to_owned(),
+        folds: arguments.folds,
+        seed: arguments.seed,
+    };
+    if source == Source::Synthetic && io::stderr().is_terminal() {
+        hint();
+    }
+    let progress = progress();
+    let scores = cross_validate(&params, &data, &folds, |done, all| {
+        progress.set_length(all as u64);
+        progress.set_position(done as u64);
+    });
+    progress.finish_and_clear();
+    let scores = scores?;
+
+    let total = start.elapsed().as_secs_f64();
+    let seconds = Seconds {
+        load,
+        fit: total - load,
+        total,
+    };
+    let report = Report::new(source.describe(), &data, protocol, scores, seconds);
+    if let Some(dir) = &arguments.out {
+        report.write(dir)?;
+    }
+    print(&report.render(arguments.format)?)
+}
+
+fn hint() {
+    let cache = data::cache().map_or_else(String::new, |dir| {
+        format!(", or put them in {}", dir.display())
+    });
+    say(&format!(
+        "note: no CUReT files; name their folder with --data or {}{cache}",
+        data::VARIABLE
+    ));
+}
+
+fn progress() -> ProgressBar {
+    // indicatif draws on standard error, and not at all where that is no terminal.
+    let bar = ProgressBar::new(0);
+    let style = ProgressStyle::with_template("{bar:40} fold {pos}/{len}, {eta} left");
+    bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+impl From<elm::Error> for Failure {
+    fn from(error: elm::Error) -> Self {
+        Self::Failed(Error::from(error))
+    }
+}

@@ -1,0 +1,78 @@
+//! An extreme learning machine as a reflectance model: features, link and network.
+
+use elm::{Elm, ElmParams};
+use elm_datasets::Directions;
+use ndarray::{Array2, ArrayView2};
+
+use crate::brdf::{Brdf, Fit};
+use crate::error::Result;
+use crate::features::Features;
+use crate::link::Link;
+
+/// What a [`BrdfModel`] is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BrdfParams {
+    /// Inputs of the network.
+    pub features: Features,
+    /// Targets of the network.
+    pub link: Link,
+    /// The network.
+    pub network: ElmParams<f64>,
+}
+
+/// A fitted reflectance model.
+///
+/// ```
+/// use elm::{ElmParams, solve::PseudoInverse};
+/// use elm_brdf::{brdf::{Brdf, Fit}, features::Features, link::Link, model::BrdfParams};
+/// use elm_datasets::{Invalid, MaterialId, synthetic};
+///
+/// let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
+/// let samples = data.samples(0).ok_or("no such material")?;
+/// let params = BrdfParams {
+///     features: Features::Paper,
+///     link: Link::Identity,
+///     network: ElmParams::new(50).solver(PseudoInverse::default()).intercept(false),
+/// };
+/// let model = params.fit(&samples.directions, samples.values.view())?;
+/// assert_eq!(model.eval(&samples.directions)?.dim(), (205, 3));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct BrdfModel {
+    features: Features,
+    link: Link,
+    network: Elm<f64>,
+}
+
+impl BrdfModel {
+    /// The fitted network.
+    #[must_use]
+    pub fn network(&self) -> &Elm<f64> {
+        &self.network
+    }
+}
+
+impl Fit for BrdfParams {
+    fn fit(&self, pairs: &[Directions], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+        let x = self.features.compute(pairs);
+        let t = self.link.to_targets(values.to_owned());
+        let network = self.network.fit(&x, &t)?;
+        Ok(Box::new(BrdfModel {
+            features: self.features,
+            link: self.link,
+            network,
+        }))
+    }
+}
+
+impl Brdf for BrdfModel {
+    fn channels(&self) -> usize {
+        self.network.outputs()
+    }
+
+    fn eval(&self, pairs: &[Directions]) -> Result<Array2<f64>> {
+        let targets = self.network.predict(&self.features.compute(pairs))?;
+        Ok(self.link.to_values(targets))
+    }
+}
