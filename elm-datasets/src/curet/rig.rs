@@ -8,7 +8,7 @@
 //! seven stations.
 //!
 //! The lattice is an octahedron with a corner at the lamp, its faces halved three times and drawn
-//! out onto the sphere: 81 normals. That the real apparatus used this lattice is inferred from the
+//! out onto the sphere: 64 normals above the lamp's horizon. That the real apparatus used this lattice is inferred from the
 //! database's `table.txt`, which these directions match to its printed precision (measurements 27
 //! to 30, with the lamp equally high, stand in another order there). Thirty pairs of measurements
 //! are reciprocal to each other, ten measurements to themselves.
@@ -32,7 +32,7 @@ type Vector = [f64; 3];
 /// degrees.
 #[must_use]
 pub fn station_angle(station: usize) -> f64 {
-    (station + 1) as f64 * PI / 8.0
+    (station as f64 + 1.0) * PI / 8.0
 }
 
 /// The pairs of directions in the order of CUReT's measurements: by station, then by falling
