@@ -202,15 +202,13 @@ pub enum Error {
     /// Measurements that cannot be written in CUReT's layout.
     #[error("these measurements do not fit CUReT's files: {0}")]
     Layout(#[from] Layout),
-    /// A malformed CSV record, or a file that broke off while it was read.
-    #[error("{}, line {line}: {reason}", path.display())]
+    /// CSV that cannot be read for a reason without a variant of its own.
+    #[error("{}, line {line}: expected comma-separated values", path.display())]
     Csv {
         /// The file, or the name given to the stream.
         path: PathBuf,
-        /// Line, counted from 1.
-        line: u64,
-        /// What the CSV reader said.
-        reason: csv::Error,
+        /// Line, counted from 1; 0 if unknown.
+        line: usize,
     },
     /// A table without a header or without rows.
     #[error("{}: expected a header and at least one row, found {found}", path.display())]
@@ -220,31 +218,71 @@ pub enum Error {
         /// What there is instead.
         found: &'static str,
     },
+    /// Numbers where the names of the columns should be.
+    #[error("{}, line {line}: expected the names of the columns, found numbers", path.display())]
+    NoHeader {
+        /// The file, or the name given to the stream.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: usize,
+    },
+    /// A column whose name is empty.
+    #[error("{}, line {line}: column {column} has no name", path.display())]
+    UnnamedColumn {
+        /// The file, or the name given to the stream.
+        path: PathBuf,
+        /// Line of the header, counted from 1.
+        line: usize,
+        /// Number of the column, counted from 1.
+        column: usize,
+    },
     /// Two columns of one name.
     #[error("{}, line {line}: expected distinct column names, found {name:?} twice", path.display())]
     DuplicateColumn {
         /// The file, or the name given to the stream.
         path: PathBuf,
         /// Line of the header, counted from 1.
-        line: u64,
-        /// The name.
+        line: usize,
+        /// The name, shortened if long.
         name: String,
     },
     /// A column that the table does not have.
     #[error("there is no column {name:?}; the table has {}", none_or_list(columns))]
     UnknownColumn {
-        /// The name asked for.
+        /// The name asked for, shortened if long.
         name: String,
         /// The names there are.
         columns: Vec<String>,
     },
+    /// A target column named twice.
+    #[error("column {name:?} is named twice among the targets")]
+    RepeatedTarget {
+        /// The name.
+        name: String,
+    },
     /// A split that leaves no inputs or no targets.
-    #[error("expected 1 to {} target columns of {columns}, found {targets}", columns.saturating_sub(1))]
+    #[error(
+        "expected at least one target and one input among {columns} columns, found {targets} targets"
+    )]
     Split {
         /// Target columns asked for.
         targets: usize,
         /// Columns of the table.
         columns: usize,
+    },
+    /// No rows asked for, or too many.
+    #[error("expected 1 to {last} rows, found {found}")]
+    Rows {
+        /// Rows asked for.
+        found: usize,
+        /// Most rows there can be.
+        last: usize,
+    },
+    /// A standard deviation that is none.
+    #[error("expected a finite standard deviation of the noise of 0 or more, found {found}")]
+    NoiseSd {
+        /// The value.
+        found: f64,
     },
 }
 
@@ -325,16 +363,16 @@ pub enum Layout {
     },
 }
 
-/// The names with commas between, or "none".
+/// The names with commas between, or "none". Escaped, for a column's name may hold a line end.
 fn none_or_list<S: AsRef<str>>(names: &[S]) -> String {
     if names.is_empty() {
         return "none".to_owned();
     }
-    names
+    let names: Vec<String> = names
         .iter()
-        .map(AsRef::as_ref)
-        .collect::<Vec<_>>()
-        .join(", ")
+        .map(|name| name.as_ref().escape_debug().to_string())
+        .collect();
+    names.join(", ")
 }
 
 fn column_text(column: &Column) -> String {

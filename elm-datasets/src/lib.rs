@@ -1,13 +1,45 @@
 //! Measured reflectance from files, a synthetic stand-in for it, and toy regression problems.
+//!
+//! - [`curet`] reads and writes the CUReT database: 61 materials at 205 pairs of directions. The
+//!   database itself is not part of the crate.
+//! - [`synthetic`] makes a set of the same shape from formulas, the [`analytic`] models. Both give
+//!   [`Measurements`], so that whatever works on one works on the other.
+//! - [`csv`] reads tables of one's own; [`toy`] makes regression problems with known answers.
+//!
+//! Directions are polar angles in radians in the frame of the surface, values are BRDF in 1/sr
+//! without the cosine. Nothing here panics on bad input: every failure is an [`Error`] that names
+//! the file, the line and what was expected there.
+//!
+//! ```
+//! use elm_datasets::{Invalid, curet, synthetic};
+//! # use std::path::Path;
+//!
+//! # fn main() -> Result<(), elm_datasets::Error> {
+//! let dir = Path::new("data/curet");
+//! let set = if curet::is_present(dir) {
+//!     curet::read(dir, &["felt".parse()?, "Human Skin".parse()?], Invalid::Clamp)?
+//! } else {
+//!     synthetic::measurements(1, &[synthetic::find("matte 01")?], Invalid::Clamp)
+//! };
+//! for (index, material) in set.materials.iter().enumerate() {
+//!     if let Some(samples) = set.samples(index) {
+//!         assert_eq!(samples.directions.len(), samples.values.nrows(), "{}", material.name);
+//!     }
+//! }
+//! # Ok(())
+//! # }
+//! ```
 
 #![forbid(unsafe_code)]
 
 pub mod analytic;
+pub mod csv;
 pub mod curet;
 pub mod error;
 pub mod measurements;
 pub mod samples;
 pub mod synthetic;
+pub mod toy;
 
 pub use curet::MaterialId;
 pub use error::Error;

@@ -93,15 +93,10 @@ fn each_entry<'a>(
 ) -> Result<(), Error> {
     let mut line_of = vec![None; last];
     let mut lines = 0;
-    for (index, bytes) in bytes
-        .trim_ascii_end()
-        .split(|&byte| byte == b'\n')
-        .enumerate()
-    {
-        // An empty file splits into one empty line, which is none.
-        if index == 0 && bytes.is_empty() {
-            break;
-        }
+    let bytes = bytes.trim_ascii_end();
+    // Nothing would split into one empty line.
+    let split = (!bytes.is_empty()).then(|| bytes.split(|&byte| byte == b'\n'));
+    for (index, bytes) in split.into_iter().flatten().enumerate() {
         let line = Line {
             path,
             number: index + 1,

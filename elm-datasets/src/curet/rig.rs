@@ -8,8 +8,10 @@
 //! seven stations.
 //!
 //! The lattice is an octahedron with a corner at the lamp, its faces halved three times and drawn
-//! out onto the sphere: 81 normals. That the real apparatus used this lattice is inferred from the
-//! database's `table.txt`, which these directions match to its printed precision.
+//! out onto the sphere: 64 normals above the lamp's horizon. That the real apparatus used this lattice is inferred from the
+//! database's `table.txt`, which these directions match to its printed precision (measurements 27
+//! to 30, with the lamp equally high, stand in another order there). Thirty pairs of measurements
+//! are reciprocal to each other, ten measurements to themselves.
 
 use std::f64::consts::PI;
 
@@ -30,7 +32,7 @@ type Vector = [f64; 3];
 /// degrees.
 #[must_use]
 pub fn station_angle(station: usize) -> f64 {
-    (station + 1) as f64 * PI / 8.0
+    (station as f64 + 1.0) * PI / 8.0
 }
 
 /// The pairs of directions in the order of CUReT's measurements: by station, then by falling
@@ -195,6 +197,21 @@ mod tests {
             }
         }
         assert_eq!(seen, [54, 97, 131, 161, 183, 196, 202]);
+    }
+
+    #[test]
+    fn thirty_pairs_are_reciprocal_and_ten_measurements_to_themselves() {
+        let all = directions();
+        let (mut pairs, mut alone) = (0, 0);
+        for (k, a) in all.iter().enumerate() {
+            for (j, b) in all[..=k].iter().map(Directions::swapped).enumerate() {
+                let same = (a.theta_i - b.theta_i).abs() < 1e-9
+                    && (a.theta_o - b.theta_o).abs() < 1e-9
+                    && (a.cos_between() - b.cos_between()).abs() < 1e-9;
+                *(if j == k { &mut alone } else { &mut pairs }) += usize::from(same);
+            }
+        }
+        assert_eq!((pairs, alone), (30, 10));
     }
 
     #[test]
