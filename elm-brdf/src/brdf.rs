@@ -1,9 +1,9 @@
 //! What every reflectance model here can do, and what can make one from measurements.
 
-use elm_datasets::Directions;
 use ndarray::{Array2, ArrayView2};
 
 use crate::error::Result;
+use crate::geometry::Pair;
 
 /// A reflectance model, possibly of several channels, or of several materials side by side.
 pub trait Brdf {
@@ -13,8 +13,8 @@ pub trait Brdf {
     /// BRDF in 1/sr, without the cosine, at each pair of directions: shape (pairs, channels).
     ///
     /// # Errors
-    /// Where a value cannot be computed, such as for an angle that is not finite.
-    fn eval(&self, pairs: &[Directions]) -> Result<Array2<f64>>;
+    /// Where a value cannot be computed, such as for a direction that is not finite.
+    fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>>;
 }
 
 /// A way to make a [`Brdf`] from measurements.
@@ -26,5 +26,5 @@ pub trait Fit {
     ///
     /// # Errors
     /// Where these measurements cannot be fitted.
-    fn fit(&self, pairs: &[Directions], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>>;
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>>;
 }

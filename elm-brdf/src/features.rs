@@ -3,12 +3,11 @@
 use std::fmt;
 use std::str::FromStr;
 
-use elm_datasets::Directions;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::geometry::{NORMAL, dot, reflect, vectors};
+use crate::geometry::{NORMAL, Pair, Vector, dot, reflect};
 
 /// A set of network inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -53,7 +52,7 @@ impl Features {
 
     /// The inputs of each pair of directions, shape (pairs, inputs).
     #[must_use]
-    pub fn compute(self, pairs: &[Directions]) -> Array2<f64> {
+    pub fn compute(self, pairs: &[Pair]) -> Array2<f64> {
         let mut out = Array2::zeros((pairs.len(), self.inputs().len()));
         for (mut row, pair) in out.rows_mut().into_iter().zip(pairs) {
             let values = match self {
@@ -67,17 +66,16 @@ impl Features {
     }
 }
 
-fn paper(pair: &Directions) -> [f64; 6] {
-    let (l, v) = vectors(pair);
-    let (sin_i, cos_i) = pair.theta_i.sin_cos();
-    let (sin_e, cos_e) = pair.theta_o.sin_cos();
+fn paper(pair: &Pair) -> [f64; 6] {
+    let (l, v) = (pair.incident, pair.outgoing);
+    let sine = |w: Vector| w[0].hypot(w[1]);
     [
         dot(l, NORMAL),
         dot(v, reflect(l, NORMAL)),
-        cos_i,
-        sin_i,
-        cos_e,
-        sin_e,
+        l[2],
+        sine(l),
+        v[2],
+        sine(v),
     ]
 }
 
@@ -105,17 +103,16 @@ impl FromStr for Features {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::cartesian;
     use std::f64::consts::{FRAC_PI_3, FRAC_PI_6, PI};
 
     #[test]
     fn the_papers_inputs_at_hand_computed_directions() {
         // Light at 30 degrees, viewer at 60 on the other side: R lies at 30 on the viewer's side,
         // 30 degrees from V.
-        let pair = Directions {
-            theta_i: FRAC_PI_6,
-            phi_i: 0.0,
-            theta_o: FRAC_PI_3,
-            phi_o: PI,
+        let pair = Pair {
+            incident: cartesian(FRAC_PI_6, 0.0),
+            outgoing: cartesian(FRAC_PI_3, PI),
         };
         let half_root_3 = 3.0_f64.sqrt() / 2.0;
         let expected = [half_root_3, half_root_3, half_root_3, 0.5, 0.5, half_root_3];

@@ -47,13 +47,41 @@ pub fn half_vector(l: Vector, v: Vector) -> Option<Vector> {
     (length > 0.0).then(|| sum.map(|c| c / length))
 }
 
-/// The light and view vectors of a pair of directions, both away from the surface.
+/// A pair of unit vectors in the frame of the surface: where light comes from and where it goes,
+/// both pointing away from the surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pair {
+    /// $\omega_i$, towards the light; the paper's $L$.
+    pub incident: Vector,
+    /// $\omega_o$, towards the viewer; the paper's $V$, at its angles $(\theta_e, \varphi_e)$.
+    pub outgoing: Vector,
+}
+
+impl Pair {
+    /// The pair with light and viewer exchanged.
+    #[must_use]
+    pub fn swapped(self) -> Self {
+        Self {
+            incident: self.outgoing,
+            outgoing: self.incident,
+        }
+    }
+}
+
+impl From<&Directions> for Pair {
+    /// Equation 12 for both directions.
+    fn from(directions: &Directions) -> Self {
+        Self {
+            incident: cartesian(directions.theta_i, directions.phi_i),
+            outgoing: cartesian(directions.theta_o, directions.phi_o),
+        }
+    }
+}
+
+/// Every pair of directions as vectors.
 #[must_use]
-pub fn vectors(pair: &Directions) -> (Vector, Vector) {
-    (
-        cartesian(pair.theta_i, pair.phi_i),
-        cartesian(pair.theta_o, pair.phi_o),
-    )
+pub fn pairs(directions: &[Directions]) -> Vec<Pair> {
+    directions.iter().map(Pair::from).collect()
 }
 
 #[cfg(test)]

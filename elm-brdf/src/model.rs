@@ -1,12 +1,12 @@
 //! An extreme learning machine as a reflectance model: features, link and network.
 
 use elm::{Elm, ElmParams};
-use elm_datasets::Directions;
 use ndarray::{Array2, ArrayView2};
 
 use crate::brdf::{Brdf, Fit};
 use crate::error::Result;
 use crate::features::Features;
+use crate::geometry::Pair;
 use crate::link::Link;
 
 /// What a [`BrdfModel`] is made of.
@@ -24,7 +24,8 @@ pub struct BrdfParams {
 ///
 /// ```
 /// use elm::{ElmParams, solve::PseudoInverse};
-/// use elm_brdf::{brdf::{Brdf, Fit}, features::Features, link::Link, model::BrdfParams};
+/// use elm_brdf::{brdf::{Brdf, Fit}, features::Features, geometry::pairs, link::Link};
+/// use elm_brdf::model::BrdfParams;
 /// use elm_datasets::{Invalid, MaterialId, synthetic};
 ///
 /// let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
@@ -34,8 +35,9 @@ pub struct BrdfParams {
 ///     link: Link::Identity,
 ///     network: ElmParams::new(50).solver(PseudoInverse::default()).intercept(false),
 /// };
-/// let model = params.fit(&samples.directions, samples.values.view())?;
-/// assert_eq!(model.eval(&samples.directions)?.dim(), (205, 3));
+/// let pairs = pairs(&samples.directions);
+/// let model = params.fit(&pairs, samples.values.view())?;
+/// assert_eq!(model.eval(&pairs)?.dim(), (205, 3));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -54,7 +56,7 @@ impl BrdfModel {
 }
 
 impl Fit for BrdfParams {
-    fn fit(&self, pairs: &[Directions], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
         let x = self.features.compute(pairs);
         let t = self.link.to_targets(values.to_owned());
         let network = self.network.fit(&x, &t)?;
@@ -71,7 +73,7 @@ impl Brdf for BrdfModel {
         self.network.outputs()
     }
 
-    fn eval(&self, pairs: &[Directions]) -> Result<Array2<f64>> {
+    fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
         let targets = self.network.predict(&self.features.compute(pairs))?;
         Ok(self.link.to_values(targets))
     }

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::brdf::Fit;
 use crate::error::{Error, Result};
+use crate::geometry::Pair;
 
 /// Which fold each measurement is held out in: a seeded shuffle, dealt into folds whose sizes
 /// differ by at most one.
@@ -172,7 +173,7 @@ fn groups(materials: &[Material]) -> Vec<Vec<usize>> {
 struct Group<'a> {
     /// Index of each measurement in the whole rig.
     rows: &'a [usize],
-    directions: Vec<Directions>,
+    pairs: Vec<Pair>,
     /// Shape (rows, channels of all materials).
     values: Array2<f64>,
 }
@@ -191,7 +192,10 @@ impl<'a> Group<'a> {
         })?;
         Ok(Self {
             rows,
-            directions: rows.iter().map(|&row| directions[row]).collect(),
+            pairs: rows
+                .iter()
+                .map(|&row| Pair::from(&directions[row]))
+                .collect(),
             values,
         })
     }
@@ -209,17 +213,17 @@ impl<'a> Group<'a> {
         for fold in 0..folds.count {
             let (test_rows, train_rows): (Vec<usize>, Vec<usize>) =
                 (0..self.rows.len()).partition(|&r| folds.of_row(self.rows[r]) == fold);
-            let select = |rows: &[usize]| -> (Vec<Directions>, Array2<f64>) {
-                let directions = rows.iter().map(|&row| self.directions[row]).collect();
-                (directions, self.values.select(Axis(0), rows))
+            let select = |rows: &[usize]| -> (Vec<Pair>, Array2<f64>) {
+                let pairs = rows.iter().map(|&row| self.pairs[row]).collect();
+                (pairs, self.values.select(Axis(0), rows))
             };
-            let (train_directions, train_values) = select(&train_rows);
-            let model = method.fit(&train_directions, train_values.view())?;
-            train.push(model.eval(&train_directions)?, train_values);
+            let (train_pairs, train_values) = select(&train_rows);
+            let model = method.fit(&train_pairs, train_values.view())?;
+            train.push(model.eval(&train_pairs)?, train_values);
             // Where invalid values are dropped a fold may hold none of a material's rows.
             if !test_rows.is_empty() {
-                let (test_directions, truth) = select(&test_rows);
-                let predicted = model.eval(&test_directions)?;
+                let (test_pairs, truth) = select(&test_rows);
+                let predicted = model.eval(&test_pairs)?;
                 for (column, metrics) in fold_metrics.iter_mut().enumerate() {
                     let (p, t) = (predicted.column(column), truth.column(column));
                     metrics.push(Metrics::of(&p.to_owned(), &t.to_owned())?);
