@@ -49,7 +49,7 @@ pub mod solve;
 
 pub use activation::Activation;
 pub use error::{Error, Result};
-pub use hidden::{Distribution, HiddenLayer};
+pub use hidden::{Biases, Distribution, HiddenLayer};
 pub use linalg::backend;
 pub use model::{CheckedParams, Elm, ElmParams, Targets};
 pub use scalar::Scalar;

@@ -7,7 +7,7 @@ mod common;
 
 use common::{Problem, frobenius, normal};
 use elm::solve::{Inverse, LeastSquares, PseudoInverse, Ridge, Solver};
-use elm::{Activation, Elm, ElmParams, Error, Result, Scalar};
+use elm::{Activation, Biases, Elm, ElmParams, Error, Result, Scalar};
 use ndarray::{Array1, Array2, array, s};
 
 fn solvers() -> [Solver; 5] {
@@ -146,8 +146,8 @@ fn settings_out_of_range_are_named_with_their_value() {
         (good().scale(-1.0), "scale", -1.0),
         (good().scale(f64::NAN), "scale", f64::NAN),
         (good().scale(f64::INFINITY), "scale", f64::INFINITY),
-        (good().bias_scale(-0.5), "bias_scale", -0.5),
-        (good().bias_scale(f64::NAN), "bias_scale", f64::NAN),
+        (good().biases(Biases::Scaled(-0.5)), "biases", -0.5),
+        (good().biases(Biases::Scaled(f64::NAN)), "biases", f64::NAN),
         (good().solver(Ridge::relative(0.0)), "lambda", 0.0),
         (good().solver(Ridge::relative(-1.0)), "lambda", -1.0),
         (good().solver(Ridge::relative(f64::NAN)), "lambda", f64::NAN),

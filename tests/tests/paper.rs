@@ -1,5 +1,8 @@
 //! The paper's equations on the paper's own inputs, through every crate.
 
+// The lint knows test functions, but not the helpers beside them.
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
+
 use approx::assert_abs_diff_eq;
 use elm::ElmParams;
 use elm::solve::{Inverse, PseudoInverse};
