@@ -22,6 +22,7 @@
 //! - [`Activation`] is the neurons' function, one of seven or your own.
 //! - [`solve`] has the solvers: equations 10 and 11 of the ELM literature, and ridge regression
 //!   with its strength chosen by exact leave-one-out, which is the default.
+//! - [`validate`] has held-out predictions in closed form, leave-one-out and k-fold.
 //! - [`metrics`] has RMSE, MAE and correlation.
 //!
 //! Everything is generic over [`Scalar`], `f32` or `f64`. No input makes the public API panic:
@@ -46,6 +47,7 @@ mod model;
 mod scalar;
 mod scaler;
 pub mod solve;
+pub mod validate;
 
 pub use activation::Activation;
 pub use error::{Error, Result};

@@ -9,6 +9,7 @@ use crate::hidden::{Biases, Distribution, HiddenLayer, Plan};
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
 use crate::solve::{Diagnosis, LeastSquares, Solution, Solver, check_length, check_matrix};
+use crate::validate::{HeldOut, Validator};
 
 /// Settings of an extreme learning machine. Setters never fail; [`check`](Self::check) and
 /// [`fit`](Self::fit) say what is out of range.
@@ -235,8 +236,74 @@ impl<A: Scalar> CheckedParams<A> {
         t: &T,
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<Elm<A>> {
+        let t = t.as_matrix();
+        let Drawn {
+            scaler,
+            hidden,
+            design,
+        } = self.draw(x.view(), t)?;
+        let Solution {
+            beta,
+            intercept,
+            diagnosis,
+        } = self
+            .0
+            .solver
+            .solve(&self.problem(&design, t, weights.as_ref())?)?;
+        Ok(Elm {
+            scaler,
+            hidden,
+            direct_links: self.0.direct_links,
+            beta,
+            intercept,
+            diagnosis,
+        })
+    }
+
+    /// Held-out predictions for every row, from one random layer and one factorisation: `folds`
+    /// has one label per row, and rows of one label are predicted by the fit to all others.
+    ///
+    /// Ridge has the same strength in every fold, given or chosen on all rows, and inputs are
+    /// standardised on all rows; [`validate`](crate::validate) says what that leaks.
+    ///
+    /// # Errors
+    /// Those of [`fit`](Self::fit) for the data and of [`Validator::k_fold`];
+    /// [`Error::Conflict`] for [`Inverse`](crate::solve::Inverse), which cannot be fitted to fewer
+    /// rows, and for a pseudo-inverse with a cut-off of its own, which would fall elsewhere in
+    /// every fold.
+    pub fn cross_validate<T: Targets<A>>(
+        &self,
+        x: &ArrayRef2<A>,
+        t: &T,
+        folds: &[usize],
+    ) -> Result<HeldOut<A>> {
+        let t = t.as_matrix();
+        let conflict = |first| {
+            Err(Error::Conflict {
+                first,
+                second: "validation in closed form",
+            })
+        };
+        let ridge = match self.0.solver {
+            Solver::Inverse(_) => return conflict("the solver 'inverse'"),
+            Solver::PseudoInverse(solver) if solver.cutoff().is_some() => {
+                return conflict("a cut-off of the pseudo-inverse");
+            }
+            Solver::PseudoInverse(_) => None,
+            Solver::Ridge(ridge) => Some(ridge),
+        };
+        let design = self.draw(x.view(), t)?.design;
+        let validator = Validator::new(&self.problem(&design, t, None)?)?;
+        let lambda = match ridge {
+            Some(ridge) => validator.strengths(ridge)?,
+            None => vec![0.0],
+        };
+        validator.k_fold(folds, &lambda)
+    }
+
+    /// Checks the data, draws the layer and applies it.
+    fn draw(&self, x: ArrayView2<'_, A>, t: ArrayView2<'_, A>) -> Result<Drawn<A>> {
         let params = &self.0;
-        let (x, t) = (x.view(), t.as_matrix());
         check_matrix("inputs", x)?;
         check_matrix("targets", t)?;
         check_length("rows of targets", t.nrows(), x.nrows())?;
@@ -256,26 +323,27 @@ impl<A: Scalar> CheckedParams<A> {
         let x = scaled.as_ref().map_or(x, |scaled| scaled.view());
         let hidden = HiddenLayer::draw(x, &params.plan());
         let design = design(&hidden, params.direct_links, x);
-        // Equation 10 has no room for a constant; asking for both explicitly is an error.
-        let inverse = matches!(params.solver, Solver::Inverse(_));
-        let mut problem =
-            LeastSquares::new(&design, &t)?.intercept(params.intercept.unwrap_or(!inverse));
-        if let Some(weights) = &weights {
-            problem = problem.weights(weights)?;
-        }
-        let Solution {
-            beta,
-            intercept,
-            diagnosis,
-        } = params.solver.solve(&problem)?;
-        Ok(Elm {
+        Ok(Drawn {
             scaler,
             hidden,
-            direct_links: params.direct_links,
-            beta,
-            intercept,
-            diagnosis,
+            design,
         })
+    }
+
+    fn problem<'a>(
+        &self,
+        design: &'a Array2<A>,
+        t: ArrayView2<'a, A>,
+        weights: Option<&'a ArrayView1<'_, A>>,
+    ) -> Result<LeastSquares<'a, A>> {
+        // Equation 10 has no room for a constant; asking for both explicitly is an error.
+        let inverse = matches!(self.0.solver, Solver::Inverse(_));
+        let problem = LeastSquares::of_views(design.view(), t)?
+            .intercept(self.0.intercept.unwrap_or(!inverse));
+        match weights {
+            Some(weights) => problem.weights(weights),
+            None => Ok(problem),
+        }
     }
 
     /// The settings.
@@ -283,6 +351,13 @@ impl<A: Scalar> CheckedParams<A> {
     pub fn params(&self) -> &ElmParams<A> {
         &self.0
     }
+}
+
+/// A random layer and what it makes of the training inputs.
+struct Drawn<A: Scalar> {
+    scaler: Option<Scaler<A>>,
+    hidden: HiddenLayer<A>,
+    design: Array2<A>,
 }
 
 /// Whether an array of this size can be allocated at all.

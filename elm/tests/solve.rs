@@ -9,10 +9,7 @@
 
 mod common;
 
-use common::{
-    Problem, deficient, doubled_columns, doubled_rows, frobenius, integers, largest, normal,
-    weights,
-};
+use common::{Problem, deficient, frobenius, integers, largest, normal, problems, weights};
 use elm::solve::{Inverse, LeastSquares, PseudoInverse, Ridge, Solver};
 use elm::{ElmParams, Scalar};
 use ndarray::{Array2, Axis, concatenate};
@@ -287,67 +284,6 @@ fn one_seed_gives_one_network_bit_for_bit() {
         assert_eq!(fit(7), fit(7));
         assert_ne!(fit(7).beta(), fit(8).beta());
     }
-}
-
-/// Problems in which something is out of the ordinary.
-fn problems<A: Scalar>() -> Vec<(&'static str, Problem<A>)> {
-    let tall = || normal::<A>(40, 8, 1);
-    let plain = || Problem::noisy(tall(), 2, 1.0, 2);
-    let mut sparse = weights::<A>(40, 3);
-    sparse[5] = A::zero();
-    sparse[17] = A::zero();
-    // One neuron that only row 3 sees: without that row its weight is 0.
-    let mut own = tall();
-    own.column_mut(2).fill(A::zero());
-    own[[3, 2]] = A::one();
-    vec![
-        ("plain", plain()),
-        ("intercept", plain().with_intercept()),
-        ("weights", plain().weighted(weights(40, 3))),
-        (
-            "weights, some 0, intercept",
-            plain().weighted(sparse).with_intercept(),
-        ),
-        ("wide", Problem::noisy(normal(12, 30, 4), 2, 1.0, 5)),
-        (
-            "wide, intercept",
-            Problem::noisy(normal(12, 30, 4), 2, 1.0, 5).with_intercept(),
-        ),
-        ("square", Problem::noisy(normal(15, 15, 6), 2, 1.0, 7)),
-        (
-            "square, intercept",
-            Problem::noisy(normal(15, 15, 6), 2, 1.0, 7).with_intercept(),
-        ),
-        (
-            "one row fewer than neurons",
-            Problem::noisy(normal(15, 14, 6), 2, 1.0, 7).with_intercept(),
-        ),
-        (
-            "rank-deficient",
-            Problem::noisy(deficient(40, 12, 5, 8), 2, 5.0, 9),
-        ),
-        (
-            "rank-deficient, intercept",
-            Problem::noisy(deficient(40, 12, 5, 8), 2, 5.0, 9).with_intercept(),
-        ),
-        (
-            "duplicated columns",
-            Problem::noisy(doubled_columns(&tall()), 2, 1.0, 10).with_intercept(),
-        ),
-        (
-            "duplicated rows",
-            Problem::noisy(doubled_rows(&tall()), 2, 1.0, 11).with_intercept(),
-        ),
-        (
-            "a row with a neuron of its own",
-            Problem::noisy(own, 2, 1.0, 12).with_intercept(),
-        ),
-        (
-            "only a constant",
-            Problem::new(Array2::ones((9, 3)), normal(9, 2, 13)).with_intercept(),
-        ),
-        ("one row", Problem::new(normal(1, 3, 14), normal(1, 2, 15))),
-    ]
 }
 
 /// Leave-one-out RMSE by fitting once without each row.

@@ -179,6 +179,11 @@ impl<A: Scalar> Spectrum<A> {
         self.frame.weighted_rows > usize::from(self.frame.intercept)
     }
 
+    /// For each output the sum of squares of $\tilde T$.
+    pub(crate) fn total_squares(&self) -> Array1<A> {
+        squares(self.c.view()) + &self.unreached
+    }
+
     /// The sum of the row weights, the largest being 1.
     pub(crate) fn total_weight(&self) -> f64 {
         self.frame.total_weight.as_f64()
