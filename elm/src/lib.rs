@@ -44,9 +44,11 @@ mod hidden;
 mod linalg;
 pub mod metrics;
 mod model;
+pub mod persist;
 mod scalar;
 mod scaler;
 pub mod solve;
+pub mod tune;
 pub mod validate;
 
 pub use activation::Activation;
@@ -56,3 +58,4 @@ pub use linalg::backend;
 pub use model::{CheckedParams, Elm, ElmParams, Targets};
 pub use scalar::Scalar;
 pub use scaler::Scaler;
+pub use tune::Tuner;

@@ -78,6 +78,21 @@ impl<A: Scalar> ElmParams<A> {
         }
     }
 
+    /// Another number of hidden neurons.
+    #[must_use]
+    pub fn with_neurons(mut self, neurons: usize) -> Self {
+        self.neurons = neurons;
+        self
+    }
+
+    pub(crate) fn neurons(&self) -> usize {
+        self.neurons
+    }
+
+    pub(crate) fn get_seed(&self) -> u64 {
+        self.seed
+    }
+
     /// The activation function of the hidden neurons.
     #[must_use]
     pub fn activation(mut self, activation: Activation<A>) -> Self {
@@ -394,7 +409,7 @@ fn design<A: Scalar>(
 /// A fitted network: $o(x) = \sum_k \beta_k f(\omega_k \cdot x + b_k)$ (equation 7) plus, where
 /// set, an intercept and direct links. Made by [`ElmParams::fit`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[serde(bound = "", try_from = "Parts<A>")]
 pub struct Elm<A: Scalar> {
     scaler: Option<Scaler<A>>,
     hidden: HiddenLayer<A>,
@@ -403,6 +418,56 @@ pub struct Elm<A: Scalar> {
     beta: Array2<A>,
     intercept: Array1<A>,
     diagnosis: Diagnosis,
+}
+
+/// An [`Elm`] as it comes from outside, before its parts are known to fit together.
+#[derive(Deserialize)]
+#[serde(bound = "")]
+struct Parts<A: Scalar> {
+    scaler: Option<Scaler<A>>,
+    hidden: HiddenLayer<A>,
+    direct_links: bool,
+    beta: Array2<A>,
+    intercept: Array1<A>,
+    diagnosis: Diagnosis,
+}
+
+impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
+    type Error = Error;
+
+    fn try_from(parts: Parts<A>) -> Result<Self> {
+        let Parts {
+            scaler,
+            hidden,
+            direct_links,
+            beta,
+            intercept,
+            diagnosis,
+        } = parts;
+        let (inputs, neurons) = hidden.weights().dim();
+        check_matrix("hidden weights", hidden.weights())?;
+        check_length("hidden biases", hidden.biases().len(), neurons)?;
+        check_matrix("hidden biases", hidden.biases().insert_axis(Axis(0)))?;
+        if let Some(scaler) = &scaler {
+            for vector in [scaler.mean(), scaler.factor()] {
+                check_length("inputs of the scaler", vector.len(), inputs)?;
+                check_matrix("the scaler", vector.insert_axis(Axis(0)))?;
+            }
+        }
+        check_matrix("output weights", beta.view())?;
+        let columns = neurons + if direct_links { inputs } else { 0 };
+        check_length("rows of output weights", beta.nrows(), columns)?;
+        check_length("intercepts", intercept.len(), beta.ncols())?;
+        check_matrix("intercepts", intercept.view().insert_axis(Axis(0)))?;
+        Ok(Self {
+            scaler,
+            hidden,
+            direct_links,
+            beta,
+            intercept,
+            diagnosis,
+        })
+    }
 }
 
 impl<A: Scalar> Elm<A> {
