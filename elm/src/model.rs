@@ -500,6 +500,23 @@ impl<A: Scalar> Elm<A> {
         }
     }
 
+    /// The hidden-layer matrix of these inputs (the paper's $F$, equation 9): shape (rows, inputs)
+    /// to (rows, neurons), followed by the standardised inputs where they are linked directly.
+    /// Times [`beta`](Self::beta) plus [`intercept`](Self::intercept) it is the prediction.
+    ///
+    /// # Errors
+    /// [`Error::Shape`], [`Error::Empty`] and [`Error::NotFinite`] for `x`.
+    pub fn hidden_matrix(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
+        check_length("inputs", x.ncols(), self.inputs())?;
+        check_matrix("inputs", x.view())?;
+        let scaled = self
+            .scaler
+            .as_ref()
+            .map(|scaler| scaler.transform(x.view()));
+        let x = scaled.as_ref().map_or(x.view(), |scaled| scaled.view());
+        Ok(design(&self.hidden, self.direct_links, x))
+    }
+
     /// Number of inputs.
     #[must_use]
     pub fn inputs(&self) -> usize {
