@@ -38,7 +38,7 @@ pub enum Link {
         /// and finite.
         offset: f64,
     },
-    /// $\sqrt[3]{f}$: between the two, and without a scale.
+    /// $f^{1/3}$: between the two, and without a scale.
     CubeRoot,
 }
 
