@@ -191,6 +191,15 @@ impl FittedLink {
         self.channels.len()
     }
 
+    /// Numbers kept for each channel.
+    pub(crate) fn floats_per_channel(&self) -> usize {
+        match self.channels.first() {
+            None | Some(Channel::Identity) => 0,
+            Some(Channel::CubeRoot { .. }) => 1,
+            Some(Channel::Log { .. }) => 2,
+        }
+    }
+
     /// Targets for BRDF values in 1/sr, shape (pairs, channels).
     ///
     /// The log of a negative value is taken as that of 0.
