@@ -81,7 +81,10 @@ impl Brdf for BrdfModel {
 
     fn floats_per_channel(&self) -> usize {
         // The seed regenerates the hidden layer. Each input has a mean and a deviation.
-        let scaler = self.network.scaler().map_or(0, |scaler| 2 * scaler.mean().len());
+        let scaler = self
+            .network
+            .scaler()
+            .map_or(0, |scaler| 2 * scaler.mean().len());
         self.network.beta().nrows() + 1 + scaler + self.link.floats_per_channel()
     }
 }

@@ -91,6 +91,18 @@ struct Choice {
 }
 
 impl GaussianProcess {
+    /// With Matérn's covariance of 5/2, the best of the three on CUReT, and 128 candidates: twice
+    /// as many gain 2 %, half as many lose 8 %.
+    #[must_use]
+    pub fn new(features: Features, link: Link) -> Self {
+        Self {
+            features,
+            link,
+            covariance: Covariance::Matern52,
+            candidates: 128,
+        }
+    }
+
     /// Inverse length scales, shape (candidates, inputs): an additive recurrence, evenly spread in
     /// the logarithm.
     ///

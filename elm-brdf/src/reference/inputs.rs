@@ -35,7 +35,13 @@ impl Frame {
         let mean = raw.sum_axis(Axis(0)) / rows;
         let deviation = (&raw - &mean).mapv(|d| d * d).sum_axis(Axis(0)) / rows;
         // Inputs are of order one; a spread below this is rounding of a constant.
-        let factor = deviation.mapv(|v| if v.sqrt() > 1e-12 { 1.0 / v.sqrt() } else { 0.0 });
+        let factor = deviation.mapv(|v| {
+            if v.sqrt() > 1e-12 {
+                1.0 / v.sqrt()
+            } else {
+                0.0
+            }
+        });
         let frame = Self {
             features,
             link,
@@ -99,7 +105,10 @@ pub(super) fn squared_distances(a: &Array2<f64>, b: &Array2<f64>) -> Array2<f64>
 ///
 /// Exact interpolation through two values at one point has no answer, and measurements that
 /// differ only by exchanging light and viewer are one point of a reciprocal set of inputs.
-pub(super) fn join_duplicates(x: &Array2<f64>, targets: &Array2<f64>) -> (Array2<f64>, Array2<f64>) {
+pub(super) fn join_duplicates(
+    x: &Array2<f64>,
+    targets: &Array2<f64>,
+) -> (Array2<f64>, Array2<f64>) {
     // Rounding of standardised inputs is some 1e-15; measured directions differ by far more.
     let same = 1e-8;
     let mut groups: Vec<Vec<usize>> = Vec::new();

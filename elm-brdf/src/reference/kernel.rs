@@ -231,7 +231,11 @@ impl Tail {
 fn with_column(matrix: &Array2<f64>, column: &Array1<f64>) -> Array2<f64> {
     let (rows, columns) = matrix.dim();
     Array2::from_shape_fn((rows, columns + 1), |(i, j)| {
-        if j < columns { matrix[[i, j]] } else { column[i] }
+        if j < columns {
+            matrix[[i, j]]
+        } else {
+            column[i]
+        }
     })
 }
 

@@ -70,7 +70,8 @@ impl Modes {
             let outgoing = self.polynomials(squared(v));
             let azimuth = (l[0] * v[1] - l[1] * v[0]).atan2(l[0] * v[0] + l[1] * v[1]);
             for (value, &[n, m, l]) in row.iter_mut().zip(&self.indices) {
-                let both = incident[[n, l]] * outgoing[[m, l]] + incident[[m, l]] * outgoing[[n, l]];
+                let both =
+                    incident[[n, l]] * outgoing[[m, l]] + incident[[m, l]] * outgoing[[n, l]];
                 *value = both * (l as f64 * azimuth).cos();
             }
         }

@@ -37,15 +37,17 @@ impl Normal {
     /// terms depend on each other.
     fn subset(&self, subset: usize) -> Option<[f64; MOST_TERMS]> {
         let inside = |term: usize| subset >> term & 1 == 1;
-        let (mut a, mut b) = (self.gram, self.moments);
-        for term in 0..MOST_TERMS {
-            if !inside(term) {
-                for other in 0..MOST_TERMS {
-                    a[term][other] = 0.0;
-                    a[other][term] = 0.0;
-                }
-                a[term][term] = 1.0;
-                b[term] = 0.0;
+        // Rows and columns of the other terms become those of the unit matrix.
+        let mut a = [[0.0; MOST_TERMS]; MOST_TERMS];
+        let mut b = [0.0; MOST_TERMS];
+        for i in 0..MOST_TERMS {
+            if !inside(i) {
+                a[i][i] = 1.0;
+                continue;
+            }
+            b[i] = self.moments[i];
+            for j in (0..MOST_TERMS).filter(|&j| inside(j)) {
+                a[i][j] = self.gram[i][j];
             }
         }
         // Terms of very different size are no reason to call them dependent.
@@ -74,8 +76,7 @@ pub(super) fn solve<const N: usize>(mut a: [[f64; N]; N], mut b: [f64; N]) -> Op
         for k in 0..j {
             a[j][j] -= a[j][k] * a[j][k];
         }
-        // NaN does not pass either.
-        if !(a[j][j] > 1e-13) {
+        if a[j][j] <= 1e-13 || a[j][j].is_nan() {
             return None;
         }
         a[j][j] = a[j][j].sqrt();
