@@ -1,6 +1,8 @@
 //! The command line: what was typed, checked, carried out and printed. Nothing else in this crate
 //! prints.
 
+mod common;
+mod compare;
 mod data;
 mod reproduce;
 
@@ -23,6 +25,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Reproduce(reproduce::Arguments),
+    Compare(compare::Arguments),
 }
 
 /// Why a command ended without doing its work.
@@ -49,9 +52,10 @@ impl From<elm_datasets::Error> for Failure {
 #[must_use]
 pub fn run() -> ExitCode {
     let outcome = match Arguments::try_parse() {
-        Ok(Arguments {
-            command: Command::Reproduce(arguments),
-        }) => reproduce::run(&arguments),
+        Ok(Arguments { command }) => match command {
+            Command::Reproduce(arguments) => reproduce::run(&arguments),
+            Command::Compare(arguments) => compare::run(&arguments),
+        },
         Err(error) => explain(&error),
     };
     match outcome {
