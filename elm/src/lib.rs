@@ -49,6 +49,7 @@ mod scalar;
 mod scaler;
 pub mod solve;
 pub mod tune;
+pub mod uncertainty;
 pub mod validate;
 
 pub use activation::Activation;
@@ -59,3 +60,4 @@ pub use model::{CheckedParams, Elm, ElmParams, Targets};
 pub use scalar::Scalar;
 pub use scaler::Scaler;
 pub use tune::Tuner;
+pub use uncertainty::UncertainElm;

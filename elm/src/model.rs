@@ -307,13 +307,22 @@ impl<A: Scalar> CheckedParams<A> {
             Solver::PseudoInverse(_) => None,
             Solver::Ridge(ridge) => Some(ridge),
         };
-        let design = self.draw(x.view(), t)?.design;
-        let validator = Validator::new(&self.problem(&design, t, None)?)?;
+        let validator = self.validator(x.view(), t)?;
         let lambda = match ridge {
             Some(ridge) => validator.strengths(ridge)?,
             None => vec![0.0],
         };
         validator.k_fold(folds, &lambda)
+    }
+
+    /// Draws the layer, applies it, and factorises.
+    pub(crate) fn validator(
+        &self,
+        x: ArrayView2<'_, A>,
+        t: ArrayView2<'_, A>,
+    ) -> Result<Validator<A>> {
+        let design = self.draw(x, t)?.design;
+        Validator::new(&self.problem(&design, t, None)?)
     }
 
     /// Checks the data, draws the layer and applies it.
@@ -345,7 +354,7 @@ impl<A: Scalar> CheckedParams<A> {
         })
     }
 
-    fn problem<'a>(
+    pub(crate) fn problem<'a>(
         &self,
         design: &'a Array2<A>,
         t: ArrayView2<'a, A>,
@@ -359,6 +368,10 @@ impl<A: Scalar> CheckedParams<A> {
             Some(weights) => problem.weights(weights),
             None => Ok(problem),
         }
+    }
+
+    pub(crate) fn solver(&self) -> Solver {
+        self.0.solver
     }
 
     /// The settings.

@@ -10,6 +10,9 @@
 //! 3. the scale again, in smaller and smaller steps;
 //! 4. on request, a scale for each input, one after the other: inputs that do not matter shrink.
 //!
+//! In 2 and 4, where a search could follow noise, a step pays only if the held-out errors fall by
+//! more than one standard error of their difference, row by row.
+//!
 //! The regularisation is chosen by leave-one-out within each trial. Every trial, and with it the
 //! way to the choice, is in [`Tuned::trials`]. Because the error of the winner was used to choose
 //! it, it is a little too good; judge the model on rows that the tuner has not seen.
@@ -28,7 +31,7 @@
 //! # Ok::<(), elm::Error>(())
 //! ```
 
-use ndarray::{Array2, ArrayRef2, ArrayView2, Axis};
+use ndarray::{Array2, ArrayRef2, ArrayView1, ArrayView2, Axis};
 use rand::SeedableRng;
 use rand::seq::index;
 use rand_chacha::ChaCha8Rng;
@@ -211,12 +214,16 @@ impl<A: Scalar> Tuner<A> {
         check_length("rows of targets", t.nrows(), x.nrows())?;
         let mut search = Search::new(self, x, t)?;
         search.run()?;
-        let trials = search.trials;
-        let Some(best) = best(&trials).cloned() else {
+        let Some(best) = search.current().map(|attempt| attempt.trial.clone()) else {
             return Err(Error::NoConvergence {
                 what: "the search for a weight scale",
             });
         };
+        let trials = search
+            .attempts
+            .into_iter()
+            .map(|attempt| attempt.trial)
+            .collect();
         let params = self.params(&best);
         let model = params.fit(&x, &t)?;
         Ok(Tuned {
@@ -263,14 +270,31 @@ impl<A: Scalar> Tuner<A> {
     }
 }
 
-/// The trial with the smallest score; of (nearly) equal ones the one with the fewest neurons.
-fn best(trials: &[Trial]) -> Option<&Trial> {
-    let smallest = trials.iter().map(|trial| trial.score).reduce(f64::min)?;
-    let bound = smallest * (1.0 + 1e-9);
-    trials
-        .iter()
-        .filter(|trial| trial.score <= bound)
-        .min_by_key(|trial| trial.neurons)
+/// A trial, with the held-out error of each row.
+struct Attempt {
+    trial: Trial,
+    /// Squared, relative to each output's variance, mean over outputs.
+    squares: Vec<f64>,
+}
+
+impl Attempt {
+    /// Whether the errors are smaller by more than one standard error of the difference.
+    fn beats(&self, other: &Self) -> bool {
+        if self.trial.score >= other.trial.score * (1.0 - WORTHWHILE) {
+            return false;
+        }
+        let gains = || {
+            other
+                .squares
+                .iter()
+                .zip(&self.squares)
+                .map(|(old, new)| old - new)
+        };
+        let rows = self.squares.len() as f64;
+        let mean = gains().sum::<f64>() / rows;
+        let variance = gains().map(|gain| (gain - mean).powi(2)).sum::<f64>() / rows;
+        mean > (variance / rows).sqrt()
+    }
 }
 
 /// A search under way.
@@ -281,7 +305,11 @@ struct Search<'a, A: Scalar> {
     /// Standard deviation of each output, 1 for a constant one.
     spread: Vec<f64>,
     folds: Option<Vec<usize>>,
-    trials: Vec<Trial>,
+    attempts: Vec<Attempt>,
+    /// Index of the setting that the search stands at.
+    current: usize,
+    /// Bounds of the scale's exponent: beyond, every neuron is a straight line or a step.
+    exponents: (f64, f64),
 }
 
 impl<'a, A: Scalar> Search<'a, A> {
@@ -296,41 +324,34 @@ impl<'a, A: Scalar> Search<'a, A> {
         } else {
             (x.to_owned(), t.to_owned())
         };
-        let spread = t.columns().into_iter().map(|column| {
-            let values: Vec<f64> = column.iter().map(|value| value.as_f64()).collect();
-            let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-            let scaled = |v: f64| if largest > 0.0 { v / largest } else { 0.0 };
-            let mean = values.iter().map(|&v| scaled(v)).sum::<f64>() / values.len() as f64;
-            let squares = values
-                .iter()
-                .map(|&v| (scaled(v) - mean).powi(2))
-                .sum::<f64>();
-            let deviation = (squares / values.len() as f64).sqrt() * largest;
-            if deviation > 0.0 { deviation } else { 1.0 }
-        });
-        let spread = spread.collect();
         let folds = match tuner.criterion {
             Criterion::LeaveOneOut => None,
             Criterion::KFold(folds) => Some(assign_folds(rows, folds, tuner.base.get_seed())?),
         };
+        // A weighted sum of standardised inputs has a deviation of about 1 at this scale.
+        let centre = -(x.ncols() as f64).log10() / 2.0;
         Ok(Self {
             tuner,
+            spread: t.columns().into_iter().map(deviation).collect(),
             x,
             t,
-            spread,
             folds,
-            trials: Vec::new(),
+            attempts: Vec::new(),
+            current: 0,
+            exponents: (centre - 3.0 * COARSE, centre + 3.0 * COARSE),
         })
     }
 
     fn run(&mut self) -> Result<()> {
         let most = self.tuner.max_neurons.min(self.x.nrows()).max(1);
         let neurons = self.tuner.neurons.unwrap_or(MODERATE.min(most));
-        // A weighted sum of standardised inputs has deviation of about 1 at this scale.
-        let centre = -(self.x.ncols() as f64).log10() / 2.0;
+        let centre = (self.exponents.0 + self.exponents.1) / 2.0;
         // From the middle outwards, so that a small budget is spent well.
         for step in [0, 1, -1, 2, -2, 3, -3] {
-            self.attempt(neurons, centre + COARSE * f64::from(step), &[])?;
+            let exponent = centre + COARSE * f64::from(step);
+            self.move_if(neurons, exponent, &[], |new, old| {
+                new.trial.score < old.trial.score
+            })?;
         }
         if self.tuner.neurons.is_none() {
             self.choose_neurons(most)?;
@@ -342,40 +363,40 @@ impl<'a, A: Scalar> Search<'a, A> {
         Ok(())
     }
 
-    /// Halves or doubles from the best so far as long as that pays.
+    /// Doubles as long as that pays.
     fn choose_neurons(&mut self, most: usize) -> Result<()> {
-        loop {
-            let Some(now) = best(&self.trials).cloned() else {
-                return Ok(());
-            };
+        while let Some(now) = self.current().map(|attempt| attempt.trial.clone()) {
             let neurons = (2 * now.neurons).min(most);
-            if neurons == now.neurons {
-                return Ok(());
-            }
-            let next = self.attempt(neurons, now.scale.log10(), &now.input_scales)?;
-            if next.is_none_or(|score| score > now.score * (1.0 - WORTHWHILE)) {
-                return Ok(());
+            let exponent = now.scale.log10();
+            if neurons == now.neurons
+                || !self.move_if(neurons, exponent, &now.input_scales, Attempt::beats)?
+            {
+                break;
             }
         }
+        Ok(())
     }
 
     fn refine_scale(&mut self) -> Result<()> {
         let mut step = COARSE / 2.0;
-        while step >= FINEST {
-            let Some(now) = best(&self.trials).cloned() else {
-                return Ok(());
-            };
+        while step >= FINEST && !self.spent() {
+            let mut moved = false;
             for direction in [1.0, -1.0] {
+                let Some(now) = self.current().map(|attempt| attempt.trial.clone()) else {
+                    return Ok(());
+                };
                 let exponent = now.scale.log10() + direction * step;
-                self.attempt(now.neurons, exponent, &now.input_scales)?;
+                if exponent < self.exponents.0 || exponent > self.exponents.1 {
+                    continue;
+                }
+                let lower = |new: &Attempt, old: &Attempt| new.trial.score < old.trial.score;
+                if self.move_if(now.neurons, exponent, &now.input_scales, lower)? {
+                    moved = true;
+                    break;
+                }
             }
-            // Along a slope the next step is as long, beyond a minimum half as long.
-            let moved = best(&self.trials).is_some_and(|best| best.scale != now.scale);
-            if !moved || step < COARSE / 2.0 {
+            if !moved {
                 step /= 2.0;
-            }
-            if self.spent() {
-                return Ok(());
             }
         }
         Ok(())
@@ -388,14 +409,14 @@ impl<'a, A: Scalar> Search<'a, A> {
             let mut moved = false;
             for input in 0..self.x.ncols() {
                 for direction in [-1.0, 1.0] {
-                    let Some(now) = best(&self.trials).cloned() else {
+                    let Some(now) = self.current().map(|attempt| attempt.trial.clone()) else {
                         return Ok(());
                     };
                     let mut scales = now.input_scales.clone();
                     scales.resize(self.x.ncols(), 1.0);
                     scales[input] *= 10.0_f64.powf(direction * step);
-                    let score = self.attempt(now.neurons, now.scale.log10(), &scales)?;
-                    if score.is_some_and(|score| score < now.score * (1.0 - WORTHWHILE)) {
+                    let exponent = now.scale.log10();
+                    if self.move_if(now.neurons, exponent, &scales, Attempt::beats)? {
                         moved = true;
                         break;
                     }
@@ -409,39 +430,93 @@ impl<'a, A: Scalar> Search<'a, A> {
     }
 
     fn spent(&self) -> bool {
-        self.trials.len() >= self.tuner.budget
+        self.attempts.len() >= self.tuner.budget
     }
 
-    /// Tries a setting and records it; nothing once the budget is spent.
-    fn attempt(&mut self, neurons: usize, exponent: f64, scales: &[f64]) -> Result<Option<f64>> {
+    fn current(&self) -> Option<&Attempt> {
+        self.attempts.get(self.current)
+    }
+
+    /// Tries a setting, records it, and moves there if it is better than where the search stands;
+    /// returns whether it moved. Does nothing once the budget is spent.
+    fn move_if(
+        &mut self,
+        neurons: usize,
+        exponent: f64,
+        scales: &[f64],
+        better: impl Fn(&Attempt, &Attempt) -> bool,
+    ) -> Result<bool> {
         if self.spent() {
-            return Ok(None);
+            return Ok(false);
         }
+        let scale = 10.0_f64.powf(exponent);
+        let attempt = self.attempt(neurons, scale, scales)?;
+        let moves = self
+            .current()
+            .is_none_or(|current| better(&attempt, current));
+        if moves {
+            self.current = self.attempts.len();
+        }
+        self.attempts.push(attempt);
+        Ok(moves)
+    }
+
+    fn attempt(&self, neurons: usize, scale: f64, scales: &[f64]) -> Result<Attempt> {
         let mut trial = Trial {
             neurons,
-            scale: 10.0_f64.powf(exponent),
+            scale,
             input_scales: scales.to_vec(),
             score: f64::INFINITY,
         };
         let params = self.tuner.params(&trial).check()?;
-        let errors = match &self.folds {
-            Some(folds) => Some(params.cross_validate(&self.x, &self.t, folds)?.rmse()),
-            None => params
-                .fit(&self.x, &self.t)?
-                .diagnosis()
-                .leave_one_out
-                .clone(),
+        let validator = params.validator(self.x.view(), self.t.view())?;
+        let lambda = validator.strengths(Ridge::leave_one_out())?;
+        let held_out = match &self.folds {
+            Some(folds) => validator.k_fold(folds, &lambda),
+            None => validator.leave_one_out(&lambda),
         };
-        // Leave-one-out does not exist for a single row; there any setting is as good.
-        if let Some(errors) = errors {
-            let relative = errors
-                .iter()
-                .zip(&self.spread)
-                .map(|(e, s)| (e / s).powi(2));
-            trial.score = (relative.sum::<f64>() / errors.len() as f64).sqrt();
-        }
-        let score = trial.score;
-        self.trials.push(trial);
-        Ok(Some(score))
+        let held_out = match held_out {
+            Ok(held_out) => held_out,
+            // A row or fold that cannot be left out, as of a single one: any setting is as good.
+            Err(Error::Undetermined { .. }) => {
+                return Ok(Attempt {
+                    trial,
+                    squares: Vec::new(),
+                });
+            }
+            Err(error) => return Err(error),
+        };
+        let outputs = self.spread.len() as f64;
+        let squares: Vec<f64> = held_out
+            .residuals()
+            .rows()
+            .into_iter()
+            .map(|row| {
+                let relative = row
+                    .iter()
+                    .zip(&self.spread)
+                    .map(|(e, s)| (e.as_f64() / s).powi(2));
+                relative.sum::<f64>() / outputs
+            })
+            .collect();
+        trial.score = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        Ok(Attempt { trial, squares })
     }
+}
+
+/// The standard deviation, or 1 where it is 0.
+fn deviation<A: Scalar>(column: ArrayView1<'_, A>) -> f64 {
+    let values: Vec<f64> = column.iter().map(|value| value.as_f64()).collect();
+    let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    if largest == 0.0 {
+        return 1.0;
+    }
+    let count = values.len() as f64;
+    let mean = values.iter().map(|v| v / largest).sum::<f64>() / count;
+    let squares = values
+        .iter()
+        .map(|v| (v / largest - mean).powi(2))
+        .sum::<f64>();
+    let deviation = (squares / count).sqrt() * largest;
+    if deviation > 0.0 { deviation } else { 1.0 }
 }
