@@ -9,7 +9,7 @@ use ndarray_linalg::{
     Cholesky, Diag, Factorize, JobSvd, Lapack, QR, SVDDC, Solve, SolveTriangular, UPLO,
 };
 
-use super::{Failure, Kernel, Svd, Triangular};
+use super::{Failure, Kernel, Positive, Svd, Triangular};
 
 #[allow(unsafe_code)]
 unsafe extern "C" {
@@ -67,15 +67,22 @@ fn solve_square<A: Lapack<Real = A>>(
 fn solve_positive<A: Lapack<Real = A>>(
     a: ArrayView2<'_, A>,
     b: ArrayView2<'_, A>,
-) -> Result<Array2<A>, Failure> {
+) -> Result<Positive<A>, Failure> {
     let lower: Array2<A> = a.cholesky(UPLO::Lower).map_err(pivot)?;
+    // With A = L L^T the trace of the inverse is the sum of squares of L^-1.
+    let inverse = lower
+        .solve_triangular(UPLO::Lower, Diag::NonUnit, &Array2::eye(a.nrows()))
+        .map_err(pivot)?;
     let upper = lower.t().as_standard_layout().into_owned();
     let half = lower
         .solve_triangular(UPLO::Lower, Diag::NonUnit, &b.to_owned())
         .map_err(pivot)?;
-    upper
-        .solve_triangular(UPLO::Upper, Diag::NonUnit, &half)
-        .map_err(pivot)
+    Ok(Positive {
+        x: upper
+            .solve_triangular(UPLO::Upper, Diag::NonUnit, &half)
+            .map_err(pivot)?,
+        inverse_trace: inverse.iter().map(|v| v.square()).sum(),
+    })
 }
 
 macro_rules! kernel {
@@ -112,10 +119,15 @@ macro_rules! kernel {
                 solve_square(a, b)
             }
 
+            fn gram(a: ArrayView2<'_, Self>) -> Array2<Self> {
+                sequential();
+                a.t().dot(&a)
+            }
+
             fn solve_positive(
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
-            ) -> Result<Array2<Self>, Failure> {
+            ) -> Result<Positive<Self>, Failure> {
                 sequential();
                 solve_positive(a, b)
             }

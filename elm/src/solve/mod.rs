@@ -19,12 +19,13 @@
 //! let solution = Solver::from(PseudoInverse::default()).solve(&LeastSquares::new(&h, &t)?)?;
 //! assert!((solution.beta[[0, 0]] - 1.0_f64).abs() < 1e-12);
 //! assert!((solution.beta[[1, 0]] - 2.0_f64).abs() < 1e-12);
-//! assert_eq!(solution.diagnosis.rank, 2);
+//! assert_eq!(solution.diagnosis.rank, Some(2));
 //! # Ok::<(), elm::Error>(())
 //! ```
 
 mod diagnosis;
 pub(crate) mod frame;
+mod gram;
 mod inverse;
 mod pseudo_inverse;
 mod ridge;
@@ -40,7 +41,7 @@ use crate::error::{Error, Result};
 use crate::linalg::Failure;
 use crate::scalar::Scalar;
 
-pub use diagnosis::{Diagnosis, Route};
+pub use diagnosis::{Diagnosis, Reason, Route};
 pub use inverse::Inverse;
 pub use pseudo_inverse::PseudoInverse;
 pub use ridge::{Lambda, Ridge};

@@ -4,7 +4,7 @@ use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
 
 use super::spectrum::{Spectrum, rounding};
-use super::{LeastSquares, Solution};
+use super::{LeastSquares, Reason, Solution};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 
@@ -62,6 +62,6 @@ impl PseudoInverse {
             }
         });
         let lambda = vec![0.0; spectrum.c.len_of(Axis(1))];
-        Ok(spectrum.solution(&gain, cutoff, lambda, None))
+        Ok(spectrum.solution(&gain, cutoff, Reason::RankDecision, lambda, None))
     }
 }
