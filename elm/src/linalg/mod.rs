@@ -154,6 +154,28 @@ mod tests {
     }
 
     #[test]
+    fn parts_of_a_larger_matrix_are_taken_as_they_lie() {
+        let whole = random(90, 80, 8);
+        for size in [1, 2, 30] {
+            let part = whole.slice(ndarray::s![3..3 + 2 * size;2, 5..5 + size]);
+            let part = part.slice(ndarray::s![..size.min(part.nrows()), ..]);
+            let copy = part.to_owned().as_standard_layout().into_owned();
+            assert_eq!(f64::svd(part).unwrap().s, f64::svd(copy.view()).unwrap().s);
+            let right = whole.slice(ndarray::s![..part.nrows(), 7..8]);
+            let one = f64::triangularise(part, right).unwrap();
+            let other = f64::triangularise(copy.view(), right.to_owned().view()).unwrap();
+            assert_eq!((one.r, one.qtb), (other.r, other.qtb));
+            assert_eq!(
+                f64::solve_square(part, right).unwrap(),
+                f64::solve_square(copy.view(), right).unwrap()
+            );
+            let positive = f64::gram(part);
+            assert_abs_diff_eq!(positive, copy.t().dot(&copy), epsilon = 1e-12);
+            assert_eq!(f64::product(part, right), f64::product(copy.view(), right));
+        }
+    }
+
+    #[test]
     fn triangularise_keeps_norms_and_normal_equations() {
         for (rows, columns) in [(1, 1), (5, 5), (40, 7), (600, 60)] {
             let (a, b) = (random(rows, columns, 3), random(rows, 4, 4));
