@@ -191,7 +191,7 @@ fn centre<A: Scalar>(matrix: &mut Array2<A>, weights: &Array1<A>, total: A) -> A
 
 /// The power of two at or just below a magnitude (so that dividing by it rounds nothing), or 1
 /// for 0.
-fn power_of_two<A: Scalar>(magnitude: A) -> A {
+pub(crate) fn power_of_two<A: Scalar>(magnitude: A) -> A {
     if magnitude == A::zero() {
         return A::one();
     }

@@ -5,7 +5,7 @@ use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip};
 use serde::{Deserialize, Serialize};
 
 use super::frame::Prepared;
-use super::spectrum::{RowSpectrum, Spectrum, rounding};
+use super::spectrum::{RowSpectrum, Spectrum};
 use super::{LeastSquares, Reason, Solution, gram};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
@@ -111,7 +111,6 @@ impl Ridge {
     }
 
     pub(super) fn solve<A: Scalar>(self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
-        let outputs = problem.outputs();
         match self.lambda {
             Lambda::Relative(lambda) => {
                 let prepared = Prepared::new(problem);
@@ -120,21 +119,9 @@ impl Ridge {
                 {
                     return Ok(solution);
                 }
-                let spectrum = Spectrum::from_prepared(prepared)?;
-                let lambda = vec![lambda; outputs];
-                Ok(answer(&spectrum, problem, Reason::WeakRidge, &lambda, None))
+                Ok(self.solve_spectrum(&Spectrum::from_prepared(prepared)?))
             }
-            Lambda::Gcv => {
-                let spectrum = Spectrum::new(problem)?;
-                let lambda = self.by_gcv(&spectrum);
-                Ok(answer(
-                    &spectrum,
-                    problem,
-                    Reason::StrengthSearch,
-                    &lambda,
-                    None,
-                ))
-            }
+            Lambda::Gcv => Ok(self.solve_spectrum(&Spectrum::new(problem)?)),
             Lambda::LeaveOneOut => {
                 let rows = RowSpectrum::new(problem)?;
                 let (lambda, errors) = self.by_leave_one_out(&rows);
@@ -143,12 +130,31 @@ impl Ridge {
                 let errors = defined.then_some(errors);
                 Ok(answer(
                     &rows.spectrum,
-                    problem,
                     Reason::StrengthSearch,
                     &lambda,
                     errors,
                 ))
             }
+        }
+    }
+
+    /// Solves without the rows, from which leave-one-out would choose: by generalised
+    /// cross-validation then.
+    pub(super) fn solve_spectrum<A: Scalar>(self, spectrum: &Spectrum<A>) -> Solution<A> {
+        let (reason, lambda) = match self.lambda {
+            Lambda::Relative(lambda) => (Reason::WeakRidge, vec![lambda; spectrum.c.ncols()]),
+            Lambda::Gcv | Lambda::LeaveOneOut => (Reason::StrengthSearch, self.by_gcv(spectrum)),
+        };
+        answer(spectrum, reason, &lambda, None)
+    }
+
+    pub(super) fn without_rows(self) -> Self {
+        match self.lambda {
+            Lambda::LeaveOneOut => Self {
+                lambda: Lambda::Gcv,
+                ..self
+            },
+            _ => self,
         }
     }
 
@@ -212,13 +218,12 @@ impl Ridge {
 
 fn answer<A: Scalar>(
     spectrum: &Spectrum<A>,
-    problem: &LeastSquares<'_, A>,
     reason: Reason,
     lambda: &[f64],
     leave_one_out: Option<Vec<f64>>,
 ) -> Solution<A> {
     let typed: Vec<A> = lambda.iter().map(|&l| A::from_f64(l)).collect();
-    let cutoff = rounding(problem.rows(), problem.neurons());
+    let cutoff = spectrum.level();
     spectrum.solution(
         &spectrum.ridge_gain(&typed),
         cutoff,

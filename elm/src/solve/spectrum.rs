@@ -91,6 +91,24 @@ impl<A: Scalar> Spectrum<A> {
         })
     }
 
+    /// For a problem of which a QR factorisation has left the triangle: `unreached` is what of each
+    /// output's sum of squares lay outside it.
+    pub(crate) fn from_triangle(prepared: Prepared<A>, unreached: Array1<A>) -> Result<Self> {
+        let mut spectrum = Self::from_prepared(prepared)?;
+        spectrum.route = Route::QrSvd;
+        if spectrum.frame.spanned_by(spectrum.s.len()) {
+            spectrum.unreached.fill(A::zero());
+        } else {
+            spectrum.unreached += &unreached;
+        }
+        Ok(spectrum)
+    }
+
+    /// The level of rounding error in singular values, relative to the largest.
+    pub(crate) fn level(&self) -> A {
+        rounding(self.frame.rows, self.vt.ncols())
+    }
+
     /// The number of singular values above `cutoff` times the largest.
     pub(crate) fn rank(&self, cutoff: A) -> usize {
         let Some(&largest) = self.s.first() else {
