@@ -30,7 +30,6 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use crate::model::Elm;
 use crate::scalar::Scalar;
@@ -41,7 +40,7 @@ pub const VERSION: u32 = 1;
 const MAGIC: &[u8; 8] = b"elmfile\n";
 
 /// Why a file was not written or not read.
-#[derive(Debug, Error)]
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// The file system refused.
