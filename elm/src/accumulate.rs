@@ -35,6 +35,7 @@
 //! Eliminating the column of ones first centres the rest, so that $R$ without its first row is the
 //! triangle of the centred problem, and the intercept is as unpenalised as in a batch fit.
 
+mod parts;
 mod spectrum;
 
 use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2, Axis, s};
@@ -56,7 +57,7 @@ use crate::solve::{Solver, check_length, check_matrix, check_room, check_weights
 /// chooses by generalised cross-validation in its place, so that
 /// [`Diagnosis::leave_one_out`](crate::solve::Diagnosis::leave_one_out) is `None`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[serde(bound = "", try_from = "parts::Parts<A>")]
 pub struct Accumulator<A: Scalar> {
     scaler: Option<Scaler<A>>,
     hidden: HiddenLayer<A>,

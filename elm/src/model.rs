@@ -441,6 +441,22 @@ struct Parts<A: Scalar> {
     diagnosis: Diagnosis,
 }
 
+/// Whether a layer and a scaler from outside are finite and fit each other.
+pub(crate) fn check_layer<A: Scalar>(
+    hidden: &HiddenLayer<A>,
+    scaler: Option<&Scaler<A>>,
+) -> Result<()> {
+    let (inputs, neurons) = hidden.weights().dim();
+    check_matrix("hidden weights", hidden.weights())?;
+    check_length("hidden biases", hidden.biases().len(), neurons)?;
+    check_matrix("hidden biases", hidden.biases().insert_axis(Axis(0)))?;
+    for vector in scaler.iter().flat_map(|s| [s.mean(), s.factor()]) {
+        check_length("inputs of the scaler", vector.len(), inputs)?;
+        check_matrix("the scaler", vector.insert_axis(Axis(0)))?;
+    }
+    Ok(())
+}
+
 impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
     type Error = Error;
 
@@ -453,16 +469,8 @@ impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
             intercept,
             diagnosis,
         } = parts;
+        check_layer(&hidden, scaler.as_ref())?;
         let (inputs, neurons) = hidden.weights().dim();
-        check_matrix("hidden weights", hidden.weights())?;
-        check_length("hidden biases", hidden.biases().len(), neurons)?;
-        check_matrix("hidden biases", hidden.biases().insert_axis(Axis(0)))?;
-        if let Some(scaler) = &scaler {
-            for vector in [scaler.mean(), scaler.factor()] {
-                check_length("inputs of the scaler", vector.len(), inputs)?;
-                check_matrix("the scaler", vector.insert_axis(Axis(0)))?;
-            }
-        }
         check_matrix("output weights", beta.view())?;
         let columns = neurons + if direct_links { inputs } else { 0 };
         check_length("rows of output weights", beta.nrows(), columns)?;

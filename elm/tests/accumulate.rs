@@ -400,3 +400,54 @@ fn single_precision_accumulates_too() {
         assert_same_fit(&model, &params.fit(&x, &t).unwrap(), &x, "f32");
     }
 }
+
+#[test]
+fn a_damaged_accumulator_is_not_read() {
+    let (x, t) = data::<f64>(200, 15);
+    let params = ElmParams::new(4).solver(Ridge::gcv()).check().unwrap();
+    let whole = serde_json::to_value(accumulated(&params, &x, &t, 60)).unwrap();
+    let read = |value: &serde_json::Value| {
+        serde_json::from_value::<Accumulator<f64>>(value.clone()).is_ok()
+    };
+    assert!(read(&whole));
+    for (field, value) in [
+        ("outputs", serde_json::json!(1)),
+        ("outputs", serde_json::json!(u64::MAX)),
+        ("inputs", serde_json::json!(2)),
+        ("direct_links", serde_json::json!(true)),
+        ("intercept", serde_json::json!(false)),
+        ("pending", serde_json::json!([1.0])),
+        ("pending", serde_json::json!(vec![0.5; 7 * 28])),
+        (
+            "scaler",
+            serde_json::json!({"mean": {"v": 1, "dim": [1], "data": [0.0]},
+                                      "factor": {"v": 1, "dim": [1], "data": [0.0]}}),
+        ),
+        (
+            "scales",
+            serde_json::json!({"v": 1, "dim": [1], "data": [1.0]}),
+        ),
+        (
+            "scales",
+            serde_json::json!({"v": 1, "dim": [7], "data": vec![0.0; 7]}),
+        ),
+        (
+            "triangle",
+            serde_json::json!({"v": 1, "dim": [7, 6], "data": vec![0.0; 42]}),
+        ),
+        (
+            "solver",
+            serde_json::json!({"ridge": {"lambda": {"relative": -1.0}, "shared": false}}),
+        ),
+    ] {
+        let mut damaged = whole.clone();
+        damaged[field] = value;
+        assert!(!read(&damaged), "{field}: {}", damaged[field]);
+    }
+    // A triangle of zeros is well formed, and has no mean.
+    let mut empty = whole;
+    empty["triangle"] = serde_json::json!({"v": 1, "dim": [7, 7], "data": vec![0.0; 49]});
+    empty["pending"] = serde_json::json!([]);
+    let empty: Accumulator<f64> = serde_json::from_value(empty).unwrap();
+    assert!(matches!(empty.fit(), Err(Error::Overflow { .. })));
+}
