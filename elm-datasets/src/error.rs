@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use crate::scattered;
+
 /// What a numbered line of a CUReT file describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -269,6 +271,16 @@ pub enum Error {
         targets: usize,
         /// Columns of the table.
         columns: usize,
+    },
+    /// A table of scattered samples that is none.
+    #[error("{}, line {line}: {problem}", path.display())]
+    Scattered {
+        /// The file, or the name given to the stream.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: usize,
+        /// What is wrong there.
+        problem: scattered::Problem,
     },
     /// No rows asked for, or too many.
     #[error("expected 1 to {last} rows, found {found}")]

@@ -36,10 +36,13 @@ pub mod analytic;
 pub mod csv;
 pub mod curet;
 pub mod error;
+mod file;
 pub mod measurements;
 pub mod samples;
+pub mod scattered;
 pub mod synthetic;
 pub mod toy;
+mod vector;
 
 pub use curet::MaterialId;
 pub use error::Error;

@@ -18,7 +18,6 @@ mod parse;
 pub mod rig;
 mod write;
 
-use std::fs;
 use std::path::Path;
 
 use ndarray::{Array2, ArrayViewMut1};
@@ -27,6 +26,7 @@ pub use names::{MATERIALS, MaterialId, NAMES};
 pub use write::write;
 
 use crate::Error;
+use crate::file;
 use crate::measurements::{Invalid, Material, Measurements, Origin};
 
 /// How many pairs of directions there are.
@@ -83,21 +83,21 @@ fn value_files(dir: &Path) -> Result<&'static [(&'static str, &'static str)], Er
 pub fn read(dir: &Path, ids: &[MaterialId], invalid: Invalid) -> Result<Measurements, Error> {
     let files = value_files(dir)?;
     let path = dir.join(TABLE);
-    let directions = parse::table(&path, &bytes(&path)?)?;
+    let directions = parse::table(&path, &file::read(&path)?)?;
     let mut wanted: Vec<(MaterialId, Array2<f64>)> = Vec::new();
     for &id in ids {
         if wanted.iter().all(|&(other, _)| other != id) {
             wanted.push((id, Array2::zeros((MEASUREMENTS, files.len()))));
         }
     }
-    for (channel, (_, file)) in files.iter().enumerate() {
-        let path = dir.join(file);
+    for (channel, (_, name)) in files.iter().enumerate() {
+        let path = dir.join(name);
         let mut columns: Vec<Option<ArrayViewMut1<'_, f64>>> = Vec::new();
         columns.resize_with(MATERIALS, || None);
         for (id, values) in &mut wanted {
             columns[id.index()] = Some(values.column_mut(channel));
         }
-        parse::values(&path, &bytes(&path)?, |id| columns[id.index()].take())?;
+        parse::values(&path, &file::read(&path)?, |id| columns[id.index()].take())?;
     }
     let materials = wanted
         .into_iter()
@@ -110,11 +110,4 @@ pub fn read(dir: &Path, ids: &[MaterialId], invalid: Invalid) -> Result<Measurem
         &channels,
         materials,
     ))
-}
-
-fn bytes(path: &Path) -> Result<Vec<u8>, Error> {
-    fs::read(path).map_err(|reason| Error::Read {
-        path: path.to_owned(),
-        reason,
-    })
 }
