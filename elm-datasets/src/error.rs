@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use crate::scattered;
+use crate::{merl, scattered};
 
 /// What a numbered line of a CUReT file describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -281,6 +281,14 @@ pub enum Error {
         line: usize,
         /// What is wrong there.
         problem: scattered::Problem,
+    },
+    /// A file that is no MERL table.
+    #[error("{}: {problem}", path.display())]
+    Merl {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: merl::Problem,
     },
     /// No rows asked for, or too many.
     #[error("expected 1 to {last} rows, found {found}")]
