@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use crate::{merl, scattered};
+use crate::{merl, rgl, scattered};
 
 /// What a numbered line of a CUReT file describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -289,6 +289,14 @@ pub enum Error {
         path: PathBuf,
         /// What is wrong with it.
         problem: merl::Problem,
+    },
+    /// A file that is no isotropic material of the RGL database.
+    #[error("{}: {problem}", path.display())]
+    Rgl {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: rgl::Problem,
     },
     /// No rows asked for, or too many.
     #[error("expected 1 to {last} rows, found {found}")]

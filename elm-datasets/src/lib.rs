@@ -39,6 +39,7 @@ pub mod error;
 mod file;
 pub mod measurements;
 pub mod merl;
+pub mod rgl;
 pub mod samples;
 pub mod sampling;
 pub mod scattered;
