@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use crate::{merl, rgl, scattered};
+use crate::{merl, pbrt, rgl, scattered};
 
 /// What a numbered line of a CUReT file describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -297,6 +297,38 @@ pub enum Error {
         path: PathBuf,
         /// What is wrong with it.
         problem: rgl::Problem,
+    },
+    /// A file that is no list of samples for pbrt-v2.
+    #[error("{}, line {line}: {problem}", path.display())]
+    Pbrt {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1; 0 if there is none.
+        line: usize,
+        /// What is wrong there.
+        problem: pbrt::Problem,
+    },
+    /// A file of no format that is known.
+    #[error(
+        "{}: expected scattered samples (.csv), a MERL table (.binary), a material of RGL (.bsdf) \
+         or samples for pbrt-v2 (.brdf); found neither such a file nor such a name",
+        path.display()
+    )]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A text that names no format.
+    #[error("{text:?} is no file format: expected csv, merl, rgl or pbrt")]
+    UnknownFormatName {
+        /// The text.
+        text: String,
+    },
+    /// A file without a row that can be used.
+    #[error("{}: expected at least one measurement, found none that is valid", path.display())]
+    NothingMeasured {
+        /// The file.
+        path: PathBuf,
     },
     /// No rows asked for, or too many.
     #[error("expected 1 to {last} rows, found {found}")]

@@ -276,3 +276,8 @@ fn dimensions(stream: &mut impl Read) -> io::Result<[i32; 3]> {
     }
     Ok(found)
 }
+
+/// Whether a file that begins with these bytes claims to be such a table.
+pub(crate) fn begins(bytes: &[u8]) -> bool {
+    dimensions(&mut &*bytes).is_ok_and(|found| found == DIMENSIONS)
+}

@@ -175,7 +175,18 @@ pub fn from_reader(
     }
 }
 
-pub(crate) fn parse(path: &Path, bytes: &[u8], options: &Options) -> Result<Samples, Error> {
+/// Whether the first line names directions.
+pub(crate) fn begins(bytes: &[u8]) -> bool {
+    let text = bytes.trim_ascii_start();
+    let line = text.split(|&byte| byte == b'\n').next().unwrap_or_default();
+    let is = |name: &&str| {
+        let mut words = line.split(|&byte| byte == b',').map(<[u8]>::trim_ascii);
+        words.any(|word| word.eq_ignore_ascii_case(name.as_bytes()))
+    };
+    ANGLES.iter().all(is) || VECTORS.iter().all(is)
+}
+
+fn parse(path: &Path, bytes: &[u8], options: &Options) -> Result<Samples, Error> {
     let (table, begins) = Table::parse(path, bytes)?;
     let error = |row: Option<usize>, problem| {
         let line = match row {

@@ -436,3 +436,8 @@ impl Fields<'_> {
         Ok(Table { size, numbers })
     }
 }
+
+/// Whether a file that begins with these bytes is in RGL's container.
+pub(crate) fn begins(bytes: &[u8]) -> bool {
+    bytes.starts_with(tensor::MAGIC)
+}
