@@ -89,6 +89,16 @@ pub enum Error {
         /// Which result.
         what: &'static str,
     },
+    /// An array would be larger than memory.
+    #[error("{what} would be {rows} x {columns}, more than memory holds")]
+    TooLarge {
+        /// Which array.
+        what: &'static str,
+        /// Its rows.
+        rows: usize,
+        /// Its columns.
+        columns: usize,
+    },
     /// A name that is not one of those known.
     #[error("unknown {what} '{name}' (expected one of: {expected})")]
     UnknownName {

@@ -34,7 +34,8 @@
 //!
 //! # Features
 //! - `faer` (default): linear algebra in pure Rust.
-//! - `openblas-system`: LAPACK from the system's OpenBLAS, in place of faer.
+//! - `openblas-system`: LAPACK from the system's OpenBLAS, in place of faer. OpenBLAS is set to one
+//!   thread for the whole process: its parallel routines overflow the stack of a Rust thread.
 
 pub mod activation;
 mod error;

@@ -187,8 +187,8 @@ impl<A: Scalar> CheckedParams<A> {
     /// `x` has shape (rows, inputs); `t` has shape (rows, outputs), or (rows) for one output.
     ///
     /// # Errors
-    /// [`Error::Empty`], [`Error::Shape`] and [`Error::NotFinite`] for the data, and those of
-    /// [`Solver::solve`].
+    /// [`Error::Empty`], [`Error::Shape`] and [`Error::NotFinite`] for the data,
+    /// [`Error::TooLarge`] for more neurons than memory holds, and those of [`Solver::solve`].
     pub fn fit<T: Targets<A>>(&self, x: &ArrayRef2<A>, t: &T) -> Result<Elm<A>> {
         self.fit_weighted(x, t, None)
     }
@@ -211,6 +211,13 @@ impl<A: Scalar> CheckedParams<A> {
         check_matrix("targets", t)?;
         check_length("rows of targets", t.nrows(), x.nrows())?;
 
+        // Asked before anything is drawn, as a failed allocation would abort the program.
+        check_room(
+            "the hidden layer",
+            x.ncols().saturating_add(1),
+            params.neurons,
+        )?;
+        check_room("the hidden-layer matrix", x.nrows(), params.neurons)?;
         let scaler = params.standardise.then(|| Scaler::measure(x));
         let hidden = HiddenLayer::draw(
             x.ncols(),
@@ -249,6 +256,21 @@ impl<A: Scalar> CheckedParams<A> {
     pub fn params(&self) -> &ElmParams<A> {
         &self.0
     }
+}
+
+/// Whether an array of this size can be allocated at all.
+fn check_room(what: &'static str, rows: usize, columns: usize) -> Result<()> {
+    let too_large = Error::TooLarge {
+        what,
+        rows,
+        columns,
+    };
+    let Some(entries) = rows.checked_mul(columns) else {
+        return Err(too_large);
+    };
+    // Layers are drawn in f64 whatever they are kept in.
+    let room = Vec::<f64>::new().try_reserve_exact(entries);
+    room.map_err(|_| too_large)
 }
 
 /// Standardise, project, activate, and append the inputs where they are linked directly.

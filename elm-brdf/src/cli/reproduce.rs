@@ -36,13 +36,28 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "LIST", default_value = "paper")]
     materials: String,
     /// Number of folds, at least 2.
-    #[arg(long, value_name = "N", default_value_t = 10)]
+    #[arg(
+        long,
+        value_name = "N",
+        allow_negative_numbers = true,
+        default_value_t = 10
+    )]
     folds: usize,
     /// Seed of the random layer and of the folds.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(
+        long,
+        value_name = "N",
+        allow_negative_numbers = true,
+        default_value_t = 1
+    )]
     seed: u64,
     /// Hidden neurons, at least 1.
-    #[arg(long, value_name = "N", default_value_t = 50)]
+    #[arg(
+        long,
+        value_name = "N",
+        allow_negative_numbers = true,
+        default_value_t = 50
+    )]
     neurons: usize,
     /// Activation function of the hidden neurons.
     #[arg(long, value_name = "NAME", default_value = "sigmoid",

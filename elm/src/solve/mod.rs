@@ -24,6 +24,7 @@
 //! ```
 
 mod diagnosis;
+pub(crate) mod frame;
 mod inverse;
 mod pseudo_inverse;
 mod ridge;

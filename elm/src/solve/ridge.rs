@@ -122,7 +122,14 @@ impl Ridge {
                     (scores[[i, output]] / total).sqrt() * scale
                 });
                 let errors = errors.collect();
-                Ok(answer(&rows.spectrum, problem, &lambda, Some(errors)))
+                // Without its only row a problem has nothing to place an intercept by.
+                let defined = rows.spectrum.can_lose_a_row();
+                Ok(answer(
+                    &rows.spectrum,
+                    problem,
+                    &lambda,
+                    defined.then_some(errors),
+                ))
             }
         }
     }
