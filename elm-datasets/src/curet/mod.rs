@@ -32,7 +32,12 @@ use crate::measurements::{Invalid, Material, Measurements, Origin};
 /// How many pairs of directions there are.
 pub const MEASUREMENTS: usize = 205;
 
-const TABLE: &str = "table.txt";
+/// The file of the directions.
+pub const TABLE: &str = "table.txt";
+
+/// The files of the values: the mean of the channels, red, green and blue.
+pub const VALUES: [&str; 4] = [AVERAGE[0].1, COLOURS[0].1, COLOURS[1].1, COLOURS[2].1];
+
 const AVERAGE: [(&str, &str); 1] = [("average", "abrdf.dat")];
 const COLOURS: [(&str, &str); 3] = [
     ("red", "rbrdf.dat"),
@@ -110,4 +115,24 @@ pub fn read(dir: &Path, ids: &[MaterialId], invalid: Invalid) -> Result<Measurem
         &channels,
         materials,
     ))
+}
+
+/// Checks that these are the bytes of a whole `table.txt`. `name` takes the place of the file in
+/// errors.
+///
+/// # Errors
+/// As for [`read`], of a damaged file.
+pub fn check_table(bytes: &[u8], name: impl AsRef<Path>) -> Result<(), Error> {
+    parse::table(name.as_ref(), bytes).map(|_| ())
+}
+
+/// Checks that these are the bytes of a whole value file, with all materials. `name` takes the
+/// place of the file in errors.
+///
+/// # Errors
+/// As for [`read`], of a damaged file.
+pub fn check_values(bytes: &[u8], name: impl AsRef<Path>) -> Result<(), Error> {
+    let mut values = Array2::zeros((MATERIALS, MEASUREMENTS));
+    let mut rows: Vec<_> = values.rows_mut().into_iter().map(Some).collect();
+    parse::values(name.as_ref(), bytes, |id| rows[id.index()].take())
 }
