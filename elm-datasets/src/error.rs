@@ -39,6 +39,18 @@ pub enum Error {
         /// What the operating system said.
         reason: std::io::Error,
     },
+    /// A file too large to be what it should be.
+    #[error(
+        "{}: expected at most {} bytes, found {found}",
+        path.display(),
+        crate::file::MOST
+    )]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its length in bytes.
+        found: u64,
+    },
     /// A file could not be written or moved into place.
     #[error("cannot write {}: {reason}", path.display())]
     Write {

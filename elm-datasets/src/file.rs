@@ -1,16 +1,31 @@
 //! Whole files: read at once, put in place at once.
 
 use std::fs;
-use std::io::Write as _;
+use std::io::{Read as _, Write as _};
 use std::path::Path;
 
 use crate::Error;
 
+/// Most bytes of a file that is read at once: several times the largest that there are, spectra of
+/// anisotropic materials of RGL's database.
+pub(crate) const MOST: u64 = 1 << 30;
+
+/// The whole file, unless it is larger than any of these formats gets.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, Error> {
-    fs::read(path).map_err(|reason| Error::Read {
+    let failed = |reason| Error::Read {
         path: path.to_owned(),
         reason,
-    })
+    };
+    let file = fs::File::open(path).map_err(failed)?;
+    let found = file.metadata().map_err(failed)?.len();
+    if found > MOST {
+        let path = path.to_owned();
+        return Err(Error::TooLarge { path, found });
+    }
+    let mut bytes = Vec::new();
+    // A pipe has no length to look at.
+    file.take(MOST).read_to_end(&mut bytes).map_err(failed)?;
+    Ok(bytes)
 }
 
 /// Puts the whole file in place in one step, or leaves what was there. The folder is made if it is

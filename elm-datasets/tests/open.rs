@@ -131,6 +131,22 @@ fn a_format_is_known_by_content_then_by_name() {
 }
 
 #[test]
+fn a_file_without_end_is_refused_before_it_is_read() {
+    let dir = tempfile::tempdir().unwrap();
+    for name in ["x.csv", "x.bsdf", "x.brdf", "x.binary"] {
+        // A hole of a terabyte takes no room on the disk and must take none in memory.
+        let path = file(dir.path(), name, "");
+        fs::File::create(&path).unwrap().set_len(1 << 40).unwrap();
+        let message = open(&path, &options(10)).unwrap_err().to_string();
+        assert!(message.contains(name), "{message}");
+        assert!(
+            message.contains("1099511627776") || name == "x.binary",
+            "{message}"
+        );
+    }
+}
+
+#[test]
 fn a_format_can_be_named() {
     let dir = tempfile::tempdir().unwrap();
     let path = file(dir.path(), "samples", WHOLE);
