@@ -29,6 +29,16 @@ pub enum Error {
         /// The measurements there are.
         rows: usize,
     },
+    /// A method is not made for so many measurements.
+    #[error("{method} of {rows} measurements: expected at most {most}")]
+    TooManyRows {
+        /// The method.
+        method: &'static str,
+        /// The measurements there are.
+        rows: usize,
+        /// The most that it takes.
+        most: usize,
+    },
     /// A folder that was asked for does not exist.
     #[error("{}: there is no such folder", path.display())]
     NoFolder {

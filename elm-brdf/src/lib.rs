@@ -41,6 +41,7 @@ pub mod link;
 pub mod model;
 pub mod protocol;
 pub mod published;
+pub mod reference;
 pub mod report;
 
 pub use error::{Error, Result};

@@ -1,6 +1,9 @@
 //! What a user reads when something is wrong: one line on standard error, nothing on standard
 //! output, and an exit code that tells bad usage (2) from failure (1).
 
+// The lint knows test functions, but not the helpers beside them.
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
+
 mod support;
 
 use std::fs;

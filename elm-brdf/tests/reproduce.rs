@@ -1,5 +1,8 @@
 //! `elm-brdf reproduce` as a user runs it.
 
+// The lint knows test functions, but not the helpers beside them.
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
+
 mod support;
 
 use std::fs;

@@ -1,6 +1,8 @@
 //! The command line: what was typed, checked, carried out and printed. Nothing else in this crate
 //! prints.
 
+mod common;
+mod compare;
 mod data;
 #[cfg(feature = "fetch")]
 mod fetch;
@@ -25,6 +27,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Reproduce(reproduce::Arguments),
+    Compare(compare::Arguments),
     #[cfg(feature = "fetch")]
     Fetch(fetch::Arguments),
 }
@@ -59,6 +62,7 @@ pub fn run() -> ExitCode {
     let outcome = match Arguments::try_parse() {
         Ok(Arguments { command }) => match command {
             Command::Reproduce(arguments) => reproduce::run(&arguments),
+            Command::Compare(arguments) => compare::run(&arguments),
             #[cfg(feature = "fetch")]
             Command::Fetch(arguments) => fetch::run(&arguments),
         },

@@ -3,7 +3,7 @@
 #![allow(dead_code)] // Each test file uses a part.
 
 use elm::Scalar;
-use elm::solve::{LeastSquares, Ridge, Solution, Solver};
+use elm::solve::{Diagnosis, LeastSquares, Ridge, Solution, Solver};
 use ndarray::{Array1, Array2, Axis, concatenate};
 use ndarray_rand::RandomExt;
 use ndarray_rand::rand_distr::{StandardNormal, Uniform};
@@ -52,6 +52,15 @@ pub(crate) fn frobenius<A: Scalar>(matrix: &Array2<A>) -> f64 {
         .map(|v| v.as_f64().powi(2))
         .sum::<f64>()
         .sqrt()
+}
+
+/// What rounding errors are amplified by on the way to the output weights: the condition of the
+/// matrix, or where it was not found that of the regularised normal equations.
+pub(crate) fn amplification(diagnosis: &Diagnosis) -> f64 {
+    diagnosis.condition.unwrap_or_else(|| {
+        let weakest = diagnosis.lambda.iter().copied().fold(1.0, f64::min);
+        2.0 / weakest
+    })
 }
 
 /// A least-squares problem that owns its data, so that rows can be taken away.
@@ -144,4 +153,65 @@ pub(crate) fn doubled_columns<A: Scalar>(matrix: &Array2<A>) -> Array2<A> {
 /// The matrix with its rows repeated.
 pub(crate) fn doubled_rows<A: Scalar>(matrix: &Array2<A>) -> Array2<A> {
     concatenate(Axis(0), &[matrix.view(), matrix.view()]).unwrap()
+}
+
+/// Problems in which something is out of the ordinary.
+pub(crate) fn problems<A: Scalar>() -> Vec<(&'static str, Problem<A>)> {
+    let tall = || normal::<A>(40, 8, 1);
+    let plain = || Problem::noisy(tall(), 2, 1.0, 2);
+    let mut sparse = weights::<A>(40, 3);
+    sparse[5] = A::zero();
+    sparse[17] = A::zero();
+    // One neuron that only row 3 sees: without that row its weight is 0.
+    let mut own = tall();
+    own.column_mut(2).fill(A::zero());
+    own[[3, 2]] = A::one();
+    vec![
+        ("plain", plain()),
+        ("intercept", plain().with_intercept()),
+        ("weights", plain().weighted(weights(40, 3))),
+        (
+            "weights, some 0, intercept",
+            plain().weighted(sparse).with_intercept(),
+        ),
+        ("wide", Problem::noisy(normal(12, 30, 4), 2, 1.0, 5)),
+        (
+            "wide, intercept",
+            Problem::noisy(normal(12, 30, 4), 2, 1.0, 5).with_intercept(),
+        ),
+        ("square", Problem::noisy(normal(15, 15, 6), 2, 1.0, 7)),
+        (
+            "square, intercept",
+            Problem::noisy(normal(15, 15, 6), 2, 1.0, 7).with_intercept(),
+        ),
+        (
+            "one row fewer than neurons",
+            Problem::noisy(normal(15, 14, 6), 2, 1.0, 7).with_intercept(),
+        ),
+        (
+            "rank-deficient",
+            Problem::noisy(deficient(40, 12, 5, 8), 2, 5.0, 9),
+        ),
+        (
+            "rank-deficient, intercept",
+            Problem::noisy(deficient(40, 12, 5, 8), 2, 5.0, 9).with_intercept(),
+        ),
+        (
+            "duplicated columns",
+            Problem::noisy(doubled_columns(&tall()), 2, 1.0, 10).with_intercept(),
+        ),
+        (
+            "duplicated rows",
+            Problem::noisy(doubled_rows(&tall()), 2, 1.0, 11).with_intercept(),
+        ),
+        (
+            "a row with a neuron of its own",
+            Problem::noisy(own, 2, 1.0, 12).with_intercept(),
+        ),
+        (
+            "only a constant",
+            Problem::new(Array2::ones((9, 3)), normal(9, 2, 13)).with_intercept(),
+        ),
+        ("one row", Problem::new(normal(1, 3, 14), normal(1, 2, 15))),
+    ]
 }
