@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use ::csv::{ErrorKind, Position, ReaderBuilder, StringRecord, Trim};
+use ::csv::{ErrorKind, Position, ReaderBuilder, StringRecord};
 use ndarray::{Array2, Axis};
 
 use crate::Error;
@@ -64,7 +64,6 @@ impl Table {
         // The header is read as a row, so that its place is known.
         let mut reader = ReaderBuilder::new()
             .has_headers(false)
-            .trim(Trim::All)
             .from_reader(source.bytes);
         let mut record = StringRecord::new();
         let mut next = |record: &mut StringRecord| {
@@ -82,7 +81,8 @@ impl Table {
         let (mut cells, mut begins) = (Vec::new(), Vec::new());
         while next(&mut record)? {
             begins.push(record.position().map_or(0, Position::byte));
-            for (cell, column) in record.iter().zip(&columns) {
+            // The reader's own trimming would make a copy of every record.
+            for (cell, column) in record.iter().map(str::trim).zip(&columns) {
                 cells.push(number(cell).ok_or_else(|| Error::NotANumber {
                     path: path.to_owned(),
                     line: source.line(record.position()),
@@ -197,12 +197,13 @@ pub(crate) fn line_of(bytes: &[u8], byte: u64) -> usize {
 
 /// The names of the columns, once they are seen to name them.
 fn header(source: Source<'_>, record: &StringRecord) -> Result<Vec<String>, Error> {
+    let names = || record.iter().map(str::trim);
     let (path, line) = (|| source.path.to_owned(), source.line(record.position()));
-    if record.iter().all(|name| name.parse::<f64>().is_ok()) {
+    if names().all(|name| name.parse::<f64>().is_ok()) {
         return Err(Error::NoHeader { path: path(), line });
     }
     let mut seen = HashSet::new();
-    for (index, name) in record.iter().enumerate() {
+    for (index, name) in names().enumerate() {
         if name.is_empty() {
             return Err(Error::UnnamedColumn {
                 path: path(),
@@ -218,7 +219,7 @@ fn header(source: Source<'_>, record: &StringRecord) -> Result<Vec<String>, Erro
             });
         }
     }
-    Ok(record.iter().map(str::to_owned).collect())
+    Ok(names().map(str::to_owned).collect())
 }
 
 fn number(cell: &str) -> Option<f64> {
