@@ -1,5 +1,11 @@
 //! Between a BRDF value and the number that the regression is asked to meet.
 //!
+//! The way back is the plain inverse, so that a model of the mean target gives a BRDF a little below
+//! its mean (Jensen's inequality). Measured on CUReT with a Gaussian process of the log, held out:
+//! multiplying by Duan's smearing factor (the mean exponential of leave-one-out residuals, JASA
+//! 78(383), 1983) or by $e^{s^2/2}$ changes the RMSE by 0.5 % at most, and a factor fitted to the
+//! leave-one-out predictions by least squares makes it worse; no correction is made.
+//!
 //! A [`Link`] is a setting. Fitted to the values of a training set it becomes a [`FittedLink`],
 //! which knows the scale of each channel and belongs to the model.
 //!

@@ -45,11 +45,12 @@ pub(super) fn hint(source: &Source) {
     ));
 }
 
-/// A bar on standard error.
-pub(super) fn progress() -> ProgressBar {
+/// A bar on standard error that counts such things.
+pub(super) fn progress(what: &str) -> ProgressBar {
     // indicatif draws on standard error, and not at all where that is no terminal.
     let bar = ProgressBar::new(0);
-    let style = ProgressStyle::with_template("{bar:40} fold {pos}/{len}, {eta} left");
+    let style =
+        ProgressStyle::with_template(&format!("{{bar:40}} {what} {{pos}}/{{len}}, {{eta}} left"));
     bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 

@@ -61,7 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .into_iter()
         .chain(networks(arguments.seed))
         .collect();
-    let progress = progress();
+    let progress = progress("model");
     progress.set_length(models.len() as u64);
     let mut entries = Vec::new();
     for model in &models {

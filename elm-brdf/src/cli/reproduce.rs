@@ -110,7 +110,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         seed: arguments.seed,
     };
     hint(&source);
-    let progress = progress();
+    let progress = progress("fold");
     let scores = cross_validate(&params, &data, &folds, |done, all| {
         progress.set_length(all as u64);
         progress.set_position(done as u64);

@@ -10,7 +10,7 @@
 //! a symmetric eigenvalue problem is not.
 
 use faer::{MatRef, Side};
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip};
+use ndarray::{Array1, Array2, ArrayView2, Axis, Zip};
 
 use crate::error::{Error, Result};
 
@@ -114,9 +114,9 @@ impl Projected {
         }
     }
 
-    /// For each column the mean of squared leave-one-out errors, $\alpha_i / G_{ii}$ with $G = U
-    /// (\Lambda + \lambda)^{-1} U^T$; `coordinates` as [`coordinates`](Self::coordinates) gives
-    /// them.
+    /// The leave-one-out errors of each column, $\alpha_i / G_{ii}$ with $G = U (\Lambda +
+    /// \lambda)^{-1} U^T$; `squared` as [`squared`](Self::squared) gives it and `coordinates` as
+    /// [`coordinates`](Self::coordinates) does.
     ///
     /// S. Rippa, *An Algorithm for Selecting a Good Value for the Parameter c in Radial Basis
     /// Function Interpolation*, Advances in Computational Mathematics 11, 1999.
@@ -145,26 +145,26 @@ impl Projected {
         self.u.mapv(|u| u * u)
     }
 
-    /// The restricted log likelihood of a column under a Gaussian process of covariance
+    /// The restricted log likelihood of each column under a Gaussian process of covariance
     /// $\sigma^2 (K + \lambda I)$ and a mean that is any of the polynomials, at its best
-    /// $\sigma^2$; up to a constant of the data. $-\infty$ where it does not exist.
+    /// $\sigma^2$; up to a constant of the polynomials and the number of rows. $-\infty$ where
+    /// it does not exist. `squared` has the squares of [`coordinates`](Self::coordinates).
     ///
     /// D. Harville, *Bayesian Inference for Variance Components Using Only Error Contrasts*,
     /// Biometrika 61(2), 1974.
-    pub(super) fn log_likelihood(&self, coordinates: ArrayView1<'_, f64>, lambda: f64) -> f64 {
+    pub(super) fn log_likelihood(&self, squared: ArrayView2<'_, f64>, lambda: f64) -> Array1<f64> {
         let count = self.free() as f64;
-        let (mut quadratic, mut log_determinant) = (0.0, 0.0);
-        for (&z, &value) in coordinates.iter().zip(&self.eigenvalues) {
-            let sum = value + lambda;
-            quadratic += z * z / sum;
-            log_determinant += sum.ln();
-        }
-        let likelihood = -0.5 * (count * (quadratic / count).ln() + log_determinant);
-        if likelihood.is_nan() {
-            f64::NEG_INFINITY
-        } else {
-            likelihood
-        }
+        let sums = &self.eigenvalues + lambda;
+        let log_determinant: f64 = sums.iter().map(|sum| sum.ln()).sum();
+        let quadratic = sums.mapv(f64::recip).dot(&squared);
+        quadratic.mapv_into(|quadratic| {
+            let likelihood = -0.5 * (count * (quadratic / count).ln() + log_determinant);
+            if likelihood.is_nan() {
+                f64::NEG_INFINITY
+            } else {
+                likelihood
+            }
+        })
     }
 }
 
@@ -252,4 +252,115 @@ pub(super) fn check_rows(method: &'static str, rows: usize) -> Result<()> {
         });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_abs_diff_eq;
+    use ndarray::{arr1, arr2, array};
+
+    /// A covariance of four points on a line, and what was measured there.
+    fn four() -> (Array2<f64>, Array2<f64>) {
+        let x = [0.0_f64, 0.4, 1.1, 2.0];
+        let kernel = Array2::from_shape_fn((4, 4), |(i, j)| f64::exp(-0.5 * (x[i] - x[j]).powi(2)));
+        (kernel, array![[0.3], [-0.2], [0.9], [0.4]])
+    }
+
+    #[test]
+    fn two_points_have_the_textbooks_mean() {
+        // C. Rasmussen, C. Williams, eq. 2.23 and 2.38. A = [[1 + l, k], [k, 1 + l]] has
+        // A^-1 = [[1 + l, -k], [-k, 1 + l]] / ((1 + l)^2 - k^2).
+        let (k, l) = (0.6, 0.1);
+        let kernel = arr2(&[[1.0, k], [k, 1.0]]);
+        let y = arr2(&[[0.5], [-0.3]]);
+        let none = Projected::new(kernel.clone(), Array2::zeros((2, 0)).view()).unwrap();
+        let alpha = none.weights(kernel.view(), y.view(), &[l]).kernel;
+        let determinant = (1.0 + l) * (1.0 + l) - k * k;
+        let expected = array![
+            [((1.0 + l) * 0.5 + k * 0.3) / determinant],
+            [(-k * 0.5 - (1.0 + l) * 0.3) / determinant]
+        ];
+        assert_abs_diff_eq!(alpha, expected, epsilon = 1e-14);
+
+        // With a mean to be found: by symmetry it is (0.5 - 0.3) / 2, and A^-1 (y - mean) =
+        // (0.4, -0.4) / (1 + l - k), as (1, -1) is an eigenvector.
+        let constant = Projected::new(kernel.clone(), Array2::ones((2, 1)).view()).unwrap();
+        let weights = constant.weights(kernel.view(), y.view(), &[l]);
+        let alpha = 0.4 / (1.0 + l - k);
+        assert_abs_diff_eq!(weights.tail, array![[0.1]], epsilon = 1e-14);
+        assert_abs_diff_eq!(weights.kernel, array![[alpha], [-alpha]], epsilon = 1e-14);
+    }
+
+    #[test]
+    fn weights_solve_the_bordered_system() {
+        let (kernel, y) = four();
+        let polynomial = arr2(&[[1.0, 0.0], [1.0, 0.4], [1.0, 1.1], [1.0, 2.0]]);
+        let projected = Projected::new(kernel.clone(), polynomial.view()).unwrap();
+        assert_eq!(projected.free(), 2);
+        for lambda in [0.0, 0.01, 3.0] {
+            let Weights {
+                kernel: alpha,
+                tail,
+            } = projected.weights(kernel.view(), y.view(), &[lambda]);
+            let left = kernel.dot(&alpha) + &alpha * lambda + polynomial.dot(&tail);
+            assert_abs_diff_eq!(left, y, epsilon = 1e-12);
+            assert_abs_diff_eq!(
+                polynomial.t().dot(&alpha),
+                Array2::zeros((2, 1)),
+                epsilon = 1e-12
+            );
+        }
+    }
+
+    #[test]
+    fn leave_one_out_errors_are_those_of_leaving_one_out() {
+        let (kernel, y) = four();
+        let (lambda, ones) = (0.05, Array2::ones((4, 1)));
+        let projected = Projected::new(kernel.clone(), ones.view()).unwrap();
+        let coordinates = projected.coordinates(y.view());
+        let errors =
+            projected.leave_one_out(projected.squared().view(), coordinates.view(), lambda);
+        for out in 0..4 {
+            let rest: Vec<usize> = (0..4).filter(|&row| row != out).collect();
+            let (k, t) = (
+                kernel.select(Axis(0), &rest).select(Axis(1), &rest),
+                y.select(Axis(0), &rest),
+            );
+            let fitted = Projected::new(k.clone(), Array2::ones((3, 1)).view()).unwrap();
+            let weights = fitted.weights(k.view(), t.view(), &[lambda]);
+            let across = kernel.row(out).select(Axis(0), &rest);
+            let predicted = across.dot(&weights.kernel.column(0)) + weights.tail[[0, 0]];
+            assert_abs_diff_eq!(errors[[out, 0]], y[[out, 0]] - predicted, epsilon = 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_restricted_likelihood_agrees_with_its_definition() {
+        // Harville: -1/2 [(n - 1) ln s2 + ln |A| + ln (1' A^-1 1) - ln (1' 1)] with s2 = (y - m)'
+        // A^-1 (y - m) / (n - 1) and m = 1' A^-1 y / 1' A^-1 1; a diagonal A needs no algebra.
+        let (diagonal, y, lambda) = (arr1(&[1.0, 2.0, 4.0]), arr1(&[0.3, -0.5, 0.7]), 0.5);
+        let a = &diagonal + lambda;
+        let weight = a.mapv(f64::recip).sum();
+        let mean = (&y / &a).sum() / weight;
+        let s2 = ((&y - mean).mapv(|d| d * d) / &a).sum() / 2.0;
+        let definition =
+            -0.5 * (2.0 * s2.ln() + a.mapv(f64::ln).sum() + weight.ln() - 3.0_f64.ln());
+
+        let projected =
+            Projected::new(Array2::from_diag(&diagonal), Array2::ones((3, 1)).view()).unwrap();
+        let z = projected.coordinates(y.insert_axis(Axis(1)).view());
+        let likelihood = projected.log_likelihood(z.mapv(|z| z * z).view(), lambda);
+        assert_abs_diff_eq!(likelihood[0], definition, epsilon = 1e-12);
+    }
+
+    #[test]
+    fn dependent_columns_of_the_polynomial_get_no_coefficient() {
+        let (kernel, y) = four();
+        let twice = Array2::from_elem((4, 2), 2.0);
+        let projected = Projected::new(kernel.clone(), twice.view()).unwrap();
+        assert_eq!(projected.free(), 3);
+        let weights = projected.weights(kernel.view(), y.view(), &[0.1]);
+        assert_eq!(weights.tail[[1, 0]], 0.0);
+    }
 }

@@ -65,6 +65,11 @@ pub struct Reference {
 /// it, on reciprocal inputs.
 #[must_use]
 pub fn all() -> Vec<Reference> {
+    with_candidates(GaussianProcess::CANDIDATES)
+}
+
+/// The same with so many candidates for the length scales of Gaussian processes.
+fn with_candidates(candidates: usize) -> Vec<Reference> {
     let mut all: Vec<Reference> = Analytic::ALL
         .into_iter()
         .map(|model| Reference {
@@ -90,12 +95,12 @@ pub fn all() -> Vec<Reference> {
         (Features::Cosines, Link::default_log()),
         (Features::ReciprocalCosines, Link::default_log()),
     ] {
-        all.extend(interpolators(features, link));
+        all.extend(interpolators(features, link, candidates));
     }
     all
 }
 
-fn interpolators(features: Features, link: Link) -> Vec<Reference> {
+fn interpolators(features: Features, link: Link, candidates: usize) -> Vec<Reference> {
     let neighbours = |count| -> Box<dyn Fit> {
         Box::new(Neighbours {
             features,
@@ -127,7 +132,10 @@ fn interpolators(features: Features, link: Link) -> Vec<Reference> {
         ),
         (
             "gaussian-process",
-            Box::new(GaussianProcess::new(features, link)) as Box<dyn Fit>,
+            Box::new(GaussianProcess {
+                candidates,
+                ..GaussianProcess::new(features, link)
+            }) as Box<dyn Fit>,
         ),
     ];
     methods

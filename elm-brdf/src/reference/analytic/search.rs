@@ -8,10 +8,9 @@ use super::nonnegative::{Normal, solve};
 /// Starts that go down from the grid.
 const STARTS: usize = 3;
 /// Steps of each at most.
-const STEPS: usize = 60;
-/// For numerical derivatives by place (0 to 1 across the bounds): near the cube root of rounding,
-/// the best for central differences.
-const DIFFERENCE: f64 = 1e-5;
+const STEPS: usize = 50;
+/// For one-sided derivatives by place (0 to 1 across the bounds): the root of rounding.
+const DIFFERENCE: f64 = 1e-8;
 
 /// Shape parameters as places within their bounds, 0 to 1.
 type Places = [f64; MOST_SHAPES];
@@ -165,14 +164,12 @@ impl<'a> Problem<'a> {
             if count == 0 || now.error <= 1e-28 * total {
                 break;
             }
-            let slopes: Vec<Vec<f64>> = (0..count)
-                .map(|i| self.slope(&now.places, i, measured))
-                .collect();
+            let slopes: Vec<Vec<f64>> = (0..count).map(|i| self.slope(&now, i, measured)).collect();
             let Some(next) = self.step(&now, &slopes, &mut damping, measured) else {
                 break;
             };
             let gained = now.error - next.error;
-            let finished = gained <= 1e-12 * now.error;
+            let finished = gained <= 1e-9 * now.error;
             now = next;
             if finished {
                 break;
@@ -182,14 +179,14 @@ impl<'a> Problem<'a> {
     }
 
     /// The derivative of the residual, weights refitted, by one place.
-    fn slope(&self, places: &Places, i: usize, measured: &[f64]) -> Vec<f64> {
-        let (mut low, mut high) = (*places, *places);
-        low[i] = (places[i] - DIFFERENCE).max(0.0);
-        high[i] = (places[i] + DIFFERENCE).min(1.0);
-        let width = high[i] - low[i];
-        let (low, high) = (self.project(low, measured), self.project(high, measured));
-        let pairs = high.residual.iter().zip(&low.residual);
-        pairs.map(|(high, low)| (high - low) / width).collect()
+    fn slope(&self, now: &Fit, i: usize, measured: &[f64]) -> Vec<f64> {
+        let mut places = now.places;
+        let inwards = if places[i] < 0.5 { 1.0 } else { -1.0 };
+        places[i] += inwards * DIFFERENCE;
+        let width = places[i] - now.places[i];
+        let moved = self.project(places, measured);
+        let pairs = moved.residual.iter().zip(&now.residual);
+        pairs.map(|(moved, here)| (moved - here) / width).collect()
     }
 
     /// The next point, if any strength of damping gives a better one.
