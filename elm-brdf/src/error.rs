@@ -17,6 +17,9 @@ pub enum Error {
     /// The network could not be fitted or evaluated.
     #[error(transparent)]
     Elm(#[from] elm::Error),
+    /// A scene could not be read or rendered.
+    #[error(transparent)]
+    Scene(#[from] crate::render::SceneError),
     /// So many folds are impossible.
     #[error("{folds} folds of {rows} measurements: expected 2 to {rows} folds")]
     Folds {
@@ -24,6 +27,44 @@ pub enum Error {
         folds: usize,
         /// The measurements there are.
         rows: usize,
+    },
+    /// A material of a scene that names no source, or several.
+    #[error("{count} of curet, measured, model, csv and analytic are given, expected one")]
+    MaterialSource {
+        /// How many are given.
+        count: usize,
+    },
+    /// A saved model that cannot be loaded.
+    #[error("{}: saved models cannot be loaded yet", path.display())]
+    NoModelFiles {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A table of samples without a column that it needs.
+    #[error("{}: there is no column '{column}'", path.display())]
+    MissingColumn {
+        /// The file.
+        path: PathBuf,
+        /// The column's name.
+        column: &'static str,
+    },
+    /// A parameter of a formula out of its range.
+    #[error("{what} is {value}, expected {least} to {most}")]
+    AnalyticValue {
+        /// The parameter.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// The least it may be.
+        least: f64,
+        /// The most it may be.
+        most: f64,
+    },
+    /// A model with a number of channels that is no colour.
+    #[error("a model of {channels} channels cannot be rendered: expected 1 or 3")]
+    Channels {
+        /// Its channels.
+        channels: usize,
     },
     /// A folder that was asked for does not exist.
     #[error("{}: there is no such folder", path.display())]

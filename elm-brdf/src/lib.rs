@@ -39,6 +39,7 @@ pub mod link;
 pub mod model;
 pub mod protocol;
 pub mod published;
+pub mod render;
 pub mod report;
 
 pub use error::{Error, Result};

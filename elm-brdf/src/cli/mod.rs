@@ -2,6 +2,7 @@
 //! prints.
 
 mod data;
+mod render;
 mod reproduce;
 
 use std::io::{self, Write};
@@ -23,6 +24,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Reproduce(reproduce::Arguments),
+    Render(render::Arguments),
 }
 
 /// Why a command ended without doing its work.
@@ -52,6 +54,9 @@ pub fn run() -> ExitCode {
         Ok(Arguments {
             command: Command::Reproduce(arguments),
         }) => reproduce::run(&arguments),
+        Ok(Arguments {
+            command: Command::Render(arguments),
+        }) => render::run(&arguments),
         Err(error) => explain(&error),
     };
     match outcome {
