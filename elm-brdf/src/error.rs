@@ -28,12 +28,19 @@ pub enum Error {
         /// The measurements there are.
         rows: usize,
     },
-    /// A material of a scene that names no source, or several.
-    #[error("{count} of curet, measured, model, csv and analytic are given, expected one")]
-    MaterialSource {
-        /// How many are given.
-        count: usize,
+    /// A method is not made for so many measurements.
+    #[error("{method} of {rows} measurements: expected at most {most}")]
+    TooManyRows {
+        /// The method.
+        method: &'static str,
+        /// The measurements there are.
+        rows: usize,
+        /// The most that it takes.
+        most: usize,
     },
+    /// A material of a scene that names no source, or several.
+    #[error("expected exactly one of curet, csv, model and analytic")]
+    MaterialSource,
     /// A saved model that cannot be loaded.
     #[error("{}: saved models cannot be loaded yet", path.display())]
     NoModelFiles {

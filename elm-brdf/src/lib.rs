@@ -39,6 +39,7 @@ pub mod link;
 pub mod model;
 pub mod protocol;
 pub mod published;
+pub mod reference;
 pub mod render;
 pub mod report;
 

@@ -22,6 +22,7 @@
 //! - [`Activation`] is the neurons' function, one of seven or your own.
 //! - [`solve`] has the solvers: equations 10 and 11 of the ELM literature, and ridge regression
 //!   with its strength chosen by exact leave-one-out, which is the default.
+//! - [`validate`] has held-out predictions in closed form, leave-one-out and k-fold.
 //! - [`metrics`] has RMSE, MAE and correlation.
 //!
 //! Everything is generic over [`Scalar`], `f32` or `f64`. No input makes the public API panic:
@@ -34,7 +35,8 @@
 //!
 //! # Features
 //! - `faer` (default): linear algebra in pure Rust.
-//! - `openblas-system`: LAPACK from the system's OpenBLAS, in place of faer.
+//! - `openblas-system`: LAPACK from the system's OpenBLAS, in place of faer. OpenBLAS is set to one
+//!   thread for the whole process: its parallel routines overflow the stack of a Rust thread.
 
 pub mod activation;
 mod error;
@@ -45,10 +47,11 @@ mod model;
 mod scalar;
 mod scaler;
 pub mod solve;
+pub mod validate;
 
 pub use activation::Activation;
 pub use error::{Error, Result};
-pub use hidden::{Distribution, HiddenLayer};
+pub use hidden::{Biases, Distribution, HiddenLayer};
 pub use linalg::backend;
 pub use model::{CheckedParams, Elm, ElmParams, Targets};
 pub use scalar::Scalar;

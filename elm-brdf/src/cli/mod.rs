@@ -1,6 +1,8 @@
 //! The command line: what was typed, checked, carried out and printed. Nothing else in this crate
 //! prints.
 
+mod common;
+mod compare;
 mod data;
 mod render;
 mod reproduce;
@@ -24,6 +26,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Reproduce(reproduce::Arguments),
+    Compare(compare::Arguments),
     Render(render::Arguments),
 }
 
@@ -51,12 +54,11 @@ impl From<elm_datasets::Error> for Failure {
 #[must_use]
 pub fn run() -> ExitCode {
     let outcome = match Arguments::try_parse() {
-        Ok(Arguments {
-            command: Command::Reproduce(arguments),
-        }) => reproduce::run(&arguments),
-        Ok(Arguments {
-            command: Command::Render(arguments),
-        }) => render::run(&arguments),
+        Ok(Arguments { command }) => match command {
+            Command::Reproduce(arguments) => reproduce::run(&arguments),
+            Command::Render(arguments) => render::run(&arguments),
+            Command::Compare(arguments) => compare::run(&arguments),
+        },
         Err(error) => explain(&error),
     };
     match outcome {

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use elm::ElmParams;
 use elm::solve::Ridge;
+use elm::{Activation, ElmParams};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::data::Source;
@@ -126,12 +126,15 @@ fn library(named: Option<&Path>) -> Result<Library, Failure> {
         Source::Curet(dir) => Some(dir),
         Source::Synthetic => None,
     };
-    let fit = Box::new(BrdfParams {
-        features: Features::Paper,
-        link: Link::Identity,
-        network: ElmParams::new(60).solver(Ridge::leave_one_out()).seed(1),
+    let network = Box::new(BrdfParams {
+        features: Features::ReciprocalCosines,
+        link: Link::default_log(),
+        network: ElmParams::new(100)
+            .activation(Activation::Sine)
+            .solver(Ridge::leave_one_out())
+            .seed(1),
     });
-    Ok(Library { curet, fit })
+    Ok(Library { curet, network })
 }
 
 /// Prints the account and writes it as JSON.

@@ -23,7 +23,6 @@ mod distribution;
 mod environment;
 mod error;
 mod film;
-mod interpolate;
 mod light;
 mod material;
 mod mesh;

@@ -166,20 +166,19 @@ fn default_up() -> Triple {
     [0.0, 1.0, 0.0]
 }
 
-/// A material. Exactly one of `curet`, `measured`, `model`, `csv` and `analytic` says where it
-/// comes from.
+/// A material. Exactly one of `curet`, `csv`, `model` and `analytic` says where it comes from.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
-    /// A model fitted to a material of CUReT, by number or name; of the stand-in if CUReT's files
-    /// are not at hand.
+    /// A material of CUReT, by number or name; of the stand-in if CUReT's files are not at hand.
     pub curet: Option<String>,
-    /// The measurements of a material of CUReT, interpolated; of the stand-in its formula.
-    pub measured: Option<String>,
+    /// Measurements in a CSV file.
+    pub csv: Option<PathBuf>,
+    /// What is fitted to measurements: `elm` (if not given), `interpolation`, which passes through
+    /// them, or one of the names of [`reference::Analytic`](crate::reference::Analytic).
+    pub fit: Option<String>,
     /// A saved model.
     pub model: Option<PathBuf>,
-    /// A model fitted to measurements in a CSV file.
-    pub csv: Option<PathBuf>,
     /// A formula: `lambert`, `oren-nayar`, `ward` or `ggx`.
     pub analytic: Option<String>,
     /// Reflectance of the formula's diffuse part.

@@ -3,14 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use elm_datasets::{
-    Directions, Invalid, MaterialId, Measurements, Samples, analytic, curet, synthetic,
+    Directions, Invalid, Measurements, Samples, analytic, curet, synthetic,
 };
 use ndarray::Array2;
 
 use super::scene;
 use crate::brdf::{Brdf, Fit};
 use crate::error::{Error, Result};
+use crate::features::Features;
 use crate::geometry::{Pair, pairs};
+use crate::link::Link;
+use crate::reference;
 
 /// A model and where it comes from, in a word: "CUReT", "stand-in", a file's name, "analytic".
 pub struct Supplied {
@@ -33,98 +36,127 @@ pub trait Supply: Sync {
 pub struct Library {
     /// Folder of CUReT's files; `None` for the stand-in.
     pub curet: Option<PathBuf>,
-    /// How models are fitted.
-    pub fit: Box<dyn Fit + Send + Sync>,
+    /// What fits a network, `fit = "elm"`.
+    pub network: Box<dyn Fit + Send + Sync>,
 }
 
 /// The stand-in's seed.
 const STAND_IN_SEED: u64 = 1;
 
+/// What measurements are turned into: the values of a scene's `fit`.
+enum Method<'a> {
+    Network(&'a dyn Fit),
+    Interpolation,
+    Formula(reference::Analytic),
+}
+
 impl Library {
-    /// What a caption calls measurements.
-    fn origin(&self) -> &'static str {
-        if self.curet.is_some() {
-            "CUReT"
-        } else {
-            "synthetic stand-in"
+    /// The method of this name.
+    fn method(&self, name: Option<&str>) -> Result<Method<'_>> {
+        match name {
+            None | Some("elm") => Ok(Method::Network(&*self.network)),
+            Some("interpolation") => Ok(Method::Interpolation),
+            Some(name) => reference::Analytic::ALL
+                .into_iter()
+                .find(|family| family.name() == name)
+                .map(Method::Formula)
+                .ok_or_else(|| Error::UnknownName {
+                    what: "fit",
+                    name: name.to_owned(),
+                    expected: format!(
+                        "elm, interpolation, {}",
+                        reference::Analytic::ALL
+                            .map(reference::Analytic::name)
+                            .join(", ")
+                    ),
+                }),
         }
     }
 
-    fn id(&self, name: &str) -> Result<MaterialId> {
-        match (&self.curet, name.parse()) {
+    /// The measurements of a material of CUReT or of the stand-in, and what a caption calls them.
+    fn measurements(&self, name: &str) -> Result<(Measurements, String)> {
+        let id = match (&self.curet, name.parse()) {
             // A scene made for CUReT renders with the stand-in too, which has names of its own.
-            (None, Err(_)) => Ok(synthetic::find(name)?),
-            (_, found) => Ok(found?),
-        }
+            (None, Err(_)) => synthetic::find(name)?,
+            (_, found) => found?,
+        };
+        Ok(match &self.curet {
+            Some(dir) => (curet::read(dir, &[id], Invalid::Clamp)?, "CUReT".to_owned()),
+            None => (
+                synthetic::measurements(STAND_IN_SEED, &[id], Invalid::Clamp),
+                "the synthetic stand-in".to_owned(),
+            ),
+        })
     }
+}
 
-    fn measurements(&self, id: MaterialId) -> Result<Measurements> {
-        match &self.curet {
-            Some(dir) => Ok(curet::read(dir, &[id], Invalid::Clamp)?),
-            None => Ok(synthetic::measurements(
-                STAND_IN_SEED,
-                &[id],
-                Invalid::Clamp,
-            )),
-        }
-    }
-
-    fn samples(&self, id: MaterialId) -> Result<Samples> {
-        // There is exactly one material, and its rows are the rig's.
-        self.measurements(id)?
-            .samples(0)
-            .ok_or(Error::Elm(elm::Error::Empty {
-                what: "measurements",
-                rows: 0,
-                columns: 0,
-            }))
-    }
-
-    fn fitted(&self, samples: &Samples) -> Result<Box<dyn Brdf>> {
-        self.fit
-            .fit(&pairs(&samples.directions), samples.values.view())
+impl Method<'_> {
+    fn fit(&self, samples: &Samples, data: &str) -> Result<Supplied> {
+        let pairs = pairs(&samples.directions);
+        let values = samples.values.view();
+        let (brdf, how) = match self {
+            Self::Network(fit) => (fit.fit(&pairs, values)?, "ELM fitted to".to_owned()),
+            Self::Interpolation => {
+                let interpolation = reference::RadialBasis {
+                    features: Features::ReciprocalCosines,
+                    link: Link::default_log(),
+                    radial: reference::Radial::ThinPlate,
+                    smoothing: reference::Smoothing::Exact,
+                };
+                (
+                    interpolation.fit(&pairs, values)?,
+                    "interpolated".to_owned(),
+                )
+            }
+            Self::Formula(family) => (
+                family.fit(&pairs, values)?,
+                format!("{} fitted to", family.name()),
+            ),
+        };
+        Ok(Supplied {
+            brdf,
+            origin: format!("{how} {data}"),
+        })
     }
 }
 
 impl Supply for Library {
     fn supply(&self, material: &scene::Material, dir: &Path) -> Result<Supplied> {
-        let given = [
-            ("curet", material.curet.is_some()),
-            ("measured", material.measured.is_some()),
-            ("model", material.model.is_some()),
-            ("csv", material.csv.is_some()),
-            ("analytic", material.analytic.is_some()),
-        ];
-        let count = given.iter().filter(|(_, given)| *given).count();
-        if count != 1 {
-            return Err(Error::MaterialSource { count });
+        let scene::Material {
+            curet,
+            csv,
+            model,
+            analytic,
+            ..
+        } = material;
+        match (curet, csv, model, analytic) {
+            (Some(name), None, None, None) => {
+                let method = self.method(material.fit.as_deref())?;
+                let (measurements, data) = self.measurements(name)?;
+                let samples = measurements
+                    .samples(0)
+                    .ok_or_else(|| no_measurements(&data))?;
+                method.fit(&samples, &data)
+            }
+            (None, Some(file), None, None) => {
+                let method = self.method(material.fit.as_deref())?;
+                method.fit(&read_csv(&dir.join(file))?, &file.display().to_string())
+            }
+            (None, None, Some(path), None) => Err(Error::NoModelFiles { path: path.clone() }),
+            (None, None, None, Some(name)) => Ok(Supplied {
+                brdf: Box::new(Analytic::from_scene(name, material)?),
+                origin: "analytic".to_owned(),
+            }),
+            _ => Err(Error::MaterialSource),
         }
-        if let Some(name) = &material.curet {
-            let brdf = self.fitted(&self.samples(self.id(name)?)?)?;
-            let origin = format!("ELM fitted to {}", self.origin());
-            return Ok(Supplied { brdf, origin });
-        }
-        if let Some(name) = &material.measured {
-            let id = self.id(name)?;
-            let brdf: Box<dyn Brdf> = match self.curet {
-                Some(_) => Box::new(super::interpolate::Interpolated::new(&self.samples(id)?)),
-                None => Box::new(Truth(id)),
-            };
-            let origin = self.origin().to_owned();
-            return Ok(Supplied { brdf, origin });
-        }
-        if let Some(path) = &material.csv {
-            let samples = read_csv(&dir.join(path))?;
-            let brdf = self.fitted(&samples)?;
-            let origin = format!("ELM fitted to {}", path.display());
-            return Ok(Supplied { brdf, origin });
-        }
-        if let Some(path) = &material.model {
-            return Err(Error::NoModelFiles { path: path.clone() });
-        }
-        let brdf = Box::new(Analytic::from_scene(material)?);
-        let origin = "analytic".to_owned();
-        Ok(Supplied { brdf, origin })
+    }
+}
+
+fn no_measurements(data: &str) -> Error {
+    Error::UnknownName {
+        what: "measurements",
+        name: data.to_owned(),
+        expected: "205 of them".to_owned(),
     }
 }
 
@@ -178,24 +210,6 @@ fn angles(pair: &Pair) -> Directions {
     }
 }
 
-/// A formula of the stand-in, before noise.
-struct Truth(MaterialId);
-
-impl Brdf for Truth {
-    fn channels(&self) -> usize {
-        3
-    }
-
-    fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
-        let mut values = Array2::zeros((pairs.len(), 3));
-        for (mut row, pair) in values.rows_mut().into_iter().zip(pairs) {
-            let truth = synthetic::truth(self.0, &angles(pair));
-            row.iter_mut().zip(truth).for_each(|(value, t)| *value = t);
-        }
-        Ok(values)
-    }
-}
-
 /// A formula of one channel: a diffuse part and a highlight, from [`elm_datasets::analytic`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Analytic {
@@ -225,8 +239,7 @@ impl Analytic {
         }
     }
 
-    fn from_scene(material: &scene::Material) -> Result<Self> {
-        let name = material.analytic.as_deref().unwrap_or_default();
+    fn from_scene(name: &str, material: &scene::Material) -> Result<Self> {
         let value = |what, given: Option<f64>, default: f64, least: f64, most: f64| {
             let value = given.unwrap_or(default);
             if (least..=most).contains(&value) {
@@ -297,5 +310,13 @@ impl Brdf for Analytic {
             };
             diffuse + highlight
         }))
+    }
+
+    fn floats_per_channel(&self) -> usize {
+        let diffuse = match self.diffuse {
+            Diffuse::Lambert { .. } => 1,
+            Diffuse::OrenNayar { .. } => 2,
+        };
+        diffuse + if self.highlight.is_some() { 2 } else { 0 }
     }
 }

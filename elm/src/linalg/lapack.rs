@@ -1,13 +1,30 @@
 //! LAPACK, by way of ndarray-linalg, over the system's OpenBLAS.
 
-use ndarray::{Array1, Array2, ArrayView2, Axis, Zip};
+use std::ffi::c_int;
+use std::sync::Once;
+
+use ndarray::{Array1, Array2, ArrayView2, Axis};
 use ndarray_linalg::error::LinalgError;
 use ndarray_linalg::{
-    Cholesky, Diag, Factorize, JobSvd, Lapack, QR, SVDDC, Scalar as _, Solve, SolveTriangular, UPLO,
+    Cholesky, Diag, Factorize, JobSvd, Lapack, QR, SVDDC, Solve, SolveTriangular, UPLO,
 };
-use num_traits::Zero;
 
 use super::{Failure, Kernel, Svd, Triangular};
+
+#[allow(unsafe_code)]
+unsafe extern "C" {
+    // Of OpenBLAS itself, in every version of it; void and free of preconditions.
+    safe fn openblas_set_num_threads(threads: c_int);
+}
+
+/// Keeps OpenBLAS to one thread, in the whole process.
+///
+/// Not a matter of speed alone: its parallel LU and triangular solves put more than 1 MB on the
+/// stack of the calling thread, which is the end of a Rust thread with the usual 2 MB.
+fn sequential() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| openblas_set_num_threads(1));
+}
 
 fn no_convergence(_: LinalgError) -> Failure {
     Failure::NoConvergence
@@ -54,7 +71,7 @@ fn solve_positive<A: Lapack<Real = A>>(
     let lower: Array2<A> = a.cholesky(UPLO::Lower).map_err(pivot)?;
     let upper = lower.t().as_standard_layout().into_owned();
     let half = lower
-        .solve_triangular(UPLO::Lower, Diag::NonUnit, &b)
+        .solve_triangular(UPLO::Lower, Diag::NonUnit, &b.to_owned())
         .map_err(pivot)?;
     upper
         .solve_triangular(UPLO::Upper, Diag::NonUnit, &half)
@@ -65,14 +82,17 @@ macro_rules! kernel {
     ($($scalar:ty),*) => {$(
         impl Kernel for $scalar {
             fn product(a: ArrayView2<'_, Self>, b: ArrayView2<'_, Self>) -> Array2<Self> {
+                sequential();
                 a.dot(&b)
             }
 
             fn svd(a: ArrayView2<'_, Self>) -> Result<Svd<Self>, Failure> {
+                sequential();
                 decompose(a)
             }
 
             fn singular_values(a: ArrayView2<'_, Self>) -> Result<Array1<Self>, Failure> {
+                sequential();
                 Ok(a.svddc(JobSvd::None).map_err(no_convergence)?.1)
             }
 
@@ -80,6 +100,7 @@ macro_rules! kernel {
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
             ) -> Result<Triangular<Self>, Failure> {
+                sequential();
                 triangularise(a, b)
             }
 
@@ -87,6 +108,7 @@ macro_rules! kernel {
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
             ) -> Result<Array2<Self>, Failure> {
+                sequential();
                 solve_square(a, b)
             }
 
@@ -94,6 +116,7 @@ macro_rules! kernel {
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
             ) -> Result<Array2<Self>, Failure> {
+                sequential();
                 solve_positive(a, b)
             }
         }

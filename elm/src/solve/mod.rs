@@ -24,6 +24,7 @@
 //! ```
 
 mod diagnosis;
+pub(crate) mod frame;
 mod inverse;
 mod pseudo_inverse;
 mod ridge;
@@ -60,7 +61,10 @@ impl<'a, A: Scalar> LeastSquares<'a, A> {
     /// [`Error::Empty`] when either has no rows or no columns, [`Error::Shape`] when their rows
     /// differ, [`Error::NotFinite`] at the first NaN or infinity.
     pub fn new(hidden: &'a ArrayRef2<A>, targets: &'a ArrayRef2<A>) -> Result<Self> {
-        let (hidden, targets) = (hidden.view(), targets.view());
+        Self::of_views(hidden.view(), targets.view())
+    }
+
+    pub(crate) fn of_views(hidden: ArrayView2<'a, A>, targets: ArrayView2<'a, A>) -> Result<Self> {
         check_matrix("hidden-layer matrix", hidden)?;
         check_matrix("targets", targets)?;
         check_length("rows of targets", targets.nrows(), hidden.nrows())?;
@@ -97,6 +101,14 @@ impl<'a, A: Scalar> LeastSquares<'a, A> {
     pub fn intercept(mut self, intercept: bool) -> Self {
         self.intercept = intercept;
         self
+    }
+
+    pub(crate) fn hidden(&self) -> ArrayView2<'a, A> {
+        self.hidden
+    }
+
+    pub(crate) fn targets(&self) -> ArrayView2<'a, A> {
+        self.targets
     }
 
     /// Number of rows.

@@ -30,6 +30,12 @@ impl PseudoInverse {
         }
     }
 
+    /// The cut-off, where one was set.
+    #[must_use]
+    pub fn cutoff(&self) -> Option<f64> {
+        self.cutoff
+    }
+
     pub(super) fn check(&self) -> Result<()> {
         match self.cutoff {
             Some(value) if !(0.0..1.0).contains(&value) => Err(Error::Parameter {
