@@ -5,22 +5,20 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use elm::solve::Ridge;
-use elm::{Activation, ElmParams};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::data::Source;
 use super::{Failure, print, say};
 use crate::error::Error;
-use crate::features::Features;
-use crate::link::Link;
-use crate::model::BrdfParams;
-use crate::render::{Account, Library, Options, Rendering, Savings, Scene, builtin, render};
+use crate::render::scene::Image;
+use crate::render::{
+    Account, Library, Options, Rendering, Savings, Scene, Sheet, builtin, default_network,
+};
 
 /// Render a scene with learnt materials.
 ///
-/// SCENE is a TOML file or a built-in scene: builtin:materials or builtin:mesh. Measurements are
-/// looked for as by 'reproduce'; without CUReT's files its materials come from the built-in
+/// SCENE is a TOML file or a built-in scene: builtin:materials, builtin:contact-sheet,
+/// builtin:comparison or builtin:mesh. Measurements are looked for as by 'reproduce'; without CUReT's files its materials come from the built-in
 /// stand-in, and the caption says so.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -32,6 +30,9 @@ pub(super) struct Arguments {
     /// Folder of CUReT files.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
+    /// For a built-in scene, the material by CUReT's number or name.
+    #[arg(long, value_name = "NAME")]
+    material: Option<String>,
     /// Pixels across and down, such as 640x360, instead of the scene's.
     #[arg(long, value_name = "SIZE", value_parser = size)]
     size: Option<(u32, u32)>,
@@ -72,18 +73,21 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     Rendering::format(&arguments.output).map_err(|error| Failure::Usage(error.to_string()))?;
-    let mut scene = match arguments.scene.strip_prefix("builtin:") {
-        Some(name) => builtin(name).map_err(|error| Failure::Usage(error.to_string()))?,
-        None => Scene::read(Path::new(&arguments.scene)).map_err(Error::from)?,
+    let mut sheet = match arguments.scene.strip_prefix("builtin:") {
+        Some(name) => builtin(name, arguments.material.as_deref())
+            .map_err(|e| Failure::Usage(e.to_string()))?,
+        None => Scene::read(Path::new(&arguments.scene))
+            .map_err(Error::from)?
+            .into(),
     };
-    arguments.amend(&mut scene);
+    arguments.amend(&mut sheet);
     let library = library(arguments.data.as_deref())?;
     let options = Options {
         savings: arguments.savings(),
         threads: arguments.threads,
     };
     let progress = progress();
-    let rendering = render(&scene, &library, options, &|done, all| {
+    let rendering = sheet.render(&library, options, &|done, all| {
         progress.set_length(all);
         progress.set_position(done);
     });
@@ -101,9 +105,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 impl Arguments {
     /// Puts what was typed in place of what the scene says.
-    fn amend(&self, scene: &mut Scene) {
-        let image = &mut scene.image;
-        (image.width, image.height) = self.size.unwrap_or((image.width, image.height));
+    fn amend(&self, sheet: &mut Sheet) {
+        if let Some((width, height)) = self.size {
+            sheet.resize(width, height);
+        }
+        for scene in sheet.scenes() {
+            self.amend_image(&mut scene.image);
+        }
+    }
+
+    fn amend_image(&self, image: &mut Image) {
         image.samples = self.samples.unwrap_or(image.samples);
         image.exposure = self.exposure.unwrap_or(image.exposure);
         image.depth = self.depth.unwrap_or(image.depth);
@@ -126,15 +137,10 @@ fn library(named: Option<&Path>) -> Result<Library, Failure> {
         Source::Curet(dir) => Some(dir),
         Source::Synthetic => None,
     };
-    let network = Box::new(BrdfParams {
-        features: Features::ReciprocalCosines,
-        link: Link::default_log(),
-        network: ElmParams::new(100)
-            .activation(Activation::Sine)
-            .solver(Ridge::leave_one_out())
-            .seed(1),
-    });
-    Ok(Library { curet, network })
+    Ok(Library {
+        curet,
+        network: Box::new(default_network),
+    })
 }
 
 /// Prints the account and writes it as JSON.

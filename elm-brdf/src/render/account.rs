@@ -22,7 +22,7 @@ pub struct Savings {
     pub dim_lights: bool,
     /// Stop where more samples would not change a pixel visibly.
     pub samples: bool,
-    /// Use a smaller network where its error cannot be seen.
+    /// Evaluate a smaller network where its error stays below half a display step.
     pub networks: bool,
 }
 
@@ -100,6 +100,9 @@ pub struct Account {
     /// Evaluations left out, by reason. Those of stopped samples are counted at the rate of the
     /// samples before.
     pub skipped: BTreeMap<String, Work>,
+    /// Evaluations done by smaller networks, with the multiplications and additions that this
+    /// saved; the seconds are not known.
+    pub smaller_networks: Work,
     /// Materials that the scene defines.
     pub materials_defined: usize,
     /// Those that were loaded or trained, with their evaluations.
@@ -118,6 +121,44 @@ pub struct Account {
     pub threads: usize,
     /// What should be known of the materials, such as an albedo above 1.
     pub notes: Vec<String>,
+}
+
+impl Account {
+    /// Adds the work of a sheet's panel, whose materials are its own.
+    pub(crate) fn merge(&mut self, other: &Self, panel: usize) {
+        self.done.add(other.done);
+        self.smaller_networks.add(other.smaller_networks);
+        for (reason, work) in &other.skipped {
+            self.skipped.entry(reason.clone()).or_default().add(*work);
+        }
+        self.materials_defined += other.materials_defined;
+        for (name, count) in &other.materials_used {
+            self.materials_used
+                .insert(format!("panel {panel}: {name}"), *count);
+        }
+        self.samples += other.samples;
+        self.samples_skipped += other.samples_skipped;
+        self.rays += other.rays;
+        self.seconds.total += other.seconds.total;
+        self.seconds.materials += other.seconds.materials;
+        self.seconds.evaluation += other.seconds.evaluation;
+        self.seconds.tracing += other.seconds.tracing;
+        self.savings = self.savings.or(other.savings);
+        self.threads = self.threads.max(other.threads);
+        for note in &other.notes {
+            if !self.notes.contains(note) {
+                self.notes.push(note.clone());
+            }
+        }
+    }
+}
+
+impl Work {
+    fn add(&mut self, other: Self) {
+        self.evaluations += other.evaluations;
+        self.multiply_adds += other.multiply_adds;
+        self.seconds += other.seconds;
+    }
 }
 
 /// Where time went.
@@ -162,6 +203,8 @@ impl Reason {
 pub(crate) struct Tally {
     /// Evaluations by material.
     pub(crate) evaluations: Vec<u64>,
+    /// Of these, by the smaller network.
+    pub(crate) small: Vec<u64>,
     /// Evaluations left out by [`Reason`] and material.
     skipped: [Vec<u64>; 7],
     pub(crate) samples: u64,
@@ -175,6 +218,7 @@ impl Tally {
     pub(crate) fn new(materials: usize) -> Self {
         Self {
             evaluations: vec![0; materials],
+            small: vec![0; materials],
             skipped: std::array::from_fn(|_| vec![0; materials]),
             ..Self::default()
         }
@@ -189,6 +233,7 @@ impl Tally {
             to.iter_mut().zip(from).for_each(|(sum, term)| *sum += term);
         };
         add(&mut self.evaluations, &other.evaluations);
+        add(&mut self.small, &other.small);
         for (to, from) in self.skipped.iter_mut().zip(&other.skipped) {
             add(to, from);
         }
@@ -200,10 +245,12 @@ impl Tally {
     }
 
     /// The account, given the names of the materials and the cost of one evaluation of each that
-    /// was loaded.
-    pub(crate) fn account(&self, materials: &[(&str, Option<usize>)]) -> Account {
+    /// was loaded, by its model and by the smaller network.
+    pub(crate) fn account(&self, materials: &[(&str, Option<[usize; 2]>)]) -> Account {
         let cost = |counts: &[u64]| -> u64 {
-            let costs = materials.iter().map(|(_, cost)| cost.unwrap_or(0) as u64);
+            let costs = materials
+                .iter()
+                .map(|(_, cost)| cost.map_or(0, |[full, _]| full) as u64);
             counts
                 .iter()
                 .zip(costs)
@@ -224,8 +271,26 @@ impl Tally {
                 seconds: evaluations as f64 * rate,
             }
         };
+        // What the smaller networks did is work done at their cost, and the rest of the model's
+        // cost is left out.
+        let saved: u64 = materials
+            .iter()
+            .zip(&self.small)
+            .map(|((_, cost), count)| {
+                let [full, small] = cost.unwrap_or_default();
+                count * full.saturating_sub(small) as u64
+            })
+            .sum();
+        let mut done = work(&self.evaluations);
+        done.multiply_adds -= saved;
+        let small = Work {
+            evaluations: self.small.iter().sum(),
+            multiply_adds: saved,
+            seconds: 0.0,
+        };
         Account {
-            done: work(&self.evaluations),
+            done,
+            smaller_networks: small,
             skipped: Reason::ALL
                 .into_iter()
                 .map(|(reason, name)| (name.to_owned(), work(&self.skipped[reason as usize])))
@@ -282,6 +347,7 @@ impl std::fmt::Display for Account {
             "number", "multiply-adds", "seconds"
         )?;
         line(f, "done", &self.done)?;
+        line(f, "of these, small", &self.smaller_networks)?;
         for (reason, work) in &self.skipped {
             line(f, reason, work)?;
         }

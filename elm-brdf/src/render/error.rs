@@ -84,6 +84,14 @@ pub enum SceneError {
         /// The names there are.
         known: String,
     },
+    /// A sheet whose panels do not fit together.
+    #[error(
+        "panel {panel} of the sheet: expected the size of the first, and a difference of panels before it"
+    )]
+    Sheet {
+        /// The panel, counted from 0.
+        panel: usize,
+    },
     /// A mesh that cannot be used.
     #[error("{}: {problem}", path.display())]
     Mesh {

@@ -111,7 +111,7 @@ impl Pixel {
 }
 
 /// Slope of sRGB's curve, 0 where it is cut off.
-fn display_slope(linear: f64) -> f64 {
+pub(crate) fn display_slope(linear: f64) -> f64 {
     if linear >= 1.0 {
         0.0
     } else if linear <= 0.003_130_8 {

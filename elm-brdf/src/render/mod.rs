@@ -20,6 +20,7 @@ mod builtin;
 mod bvh;
 mod camera;
 mod distribution;
+mod economy;
 mod environment;
 mod error;
 mod film;
@@ -31,6 +32,7 @@ mod proxy;
 mod random;
 pub mod scene;
 mod shape;
+mod sheet;
 mod shelf;
 mod supply;
 mod tracer;
@@ -44,12 +46,13 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 pub use account::{Account, Savings, Seconds, Work};
-pub use builtin::builtin;
+pub use builtin::{NAMES as BUILTIN_NAMES, builtin};
 pub use error::{MeshProblem, Place, SceneError};
 pub use material::Material;
 pub use picture::Bitmap;
 pub use scene::Scene;
-pub use supply::{Analytic, Library, Supplied, Supply};
+pub use sheet::{Content, Panel, Sheet};
+pub use supply::{Analytic, Library, Recipe, Supplied, Supply, default_network};
 
 use account::{Reason, Tally};
 use batch::Batch;
@@ -64,6 +67,9 @@ use crate::error::Result;
 const TILE: u32 = 32;
 /// Samples of every pixel before the first is looked at for stopping.
 const FIRST_SAMPLES: u32 = 4;
+
+/// Samples of a picture from which on it is worth fitting smaller networks.
+const SAMPLES_WORTH_ECONOMY: u64 = 1 << 19;
 
 /// How to render, beside what the scene says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -98,6 +104,10 @@ pub struct Rendering {
     pub caption: String,
     /// Factor on the radiance before display.
     pub gain: f64,
+    /// What the materials that were used are called.
+    pub names: Vec<String>,
+    /// Where they come from, each source once.
+    pub origins: Vec<String>,
     /// What was done.
     pub account: Account,
 }
@@ -127,7 +137,11 @@ pub fn render(
             reason: reason.to_string(),
         })?;
     let world = World::new(scene)?;
-    let shelf = Shelf::new(scene, supply);
+    let image = &scene.image;
+    let samples = u64::from(image.width) * u64::from(image.height) * u64::from(image.samples);
+    // A smaller network pays for its own fitting only in a picture of some size.
+    let economise = options.savings.networks && samples >= SAMPLES_WORTH_ECONOMY;
+    let shelf = Shelf::new(scene, supply, economise);
     if !options.savings.materials {
         shelf.fill()?;
     }
@@ -162,8 +176,10 @@ impl<'a> Picture<'a> {
                 width: image.width,
                 depth: image.depth,
                 seed: image.seed,
+                samples_per_pixel: image.samples,
                 // Half a step of 8-bit sRGB where its slope is steepest, 12.92 at black.
                 tolerance: 0.5 / (255.0 * 12.92 * gain),
+                gain,
             },
             film: Mutex::new(Film::new(image.width, image.height)),
             tally: Mutex::new(Tally::new(world.materials.len())),
@@ -260,9 +276,10 @@ impl<'a> Picture<'a> {
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner);
         let shelf = self.tracer.shelf;
-        let materials: Vec<(&str, Option<usize>)> = shelf
+        let cost = |m: &Material| [m.multiply_adds(), m.small_multiply_adds()];
+        let materials: Vec<(&str, Option<[usize; 2]>)> = shelf
             .stocked()
-            .map(|(name, stocked)| (name, stocked.map(|s| s.material.multiply_adds())))
+            .map(|(name, stocked)| (name, stocked.map(|s| cost(&s.material))))
             .collect();
         let mut account = tally.account(&materials);
         account.savings = Some(self.tracer.savings);
@@ -276,13 +293,22 @@ impl<'a> Picture<'a> {
                 ));
             }
         }
-        let data = shelf.origins().join(", ");
+        let origins = shelf.origins();
+        let titles = shelf
+            .stocked()
+            .filter_map(|(_, stocked)| stocked?.title.clone());
+        let names: Vec<String> = titles.collect();
         Rendering {
             width: image.width,
             height: image.height,
             pixels: film.picture(),
             labels,
-            caption: image.caption.replace("{data}", &data),
+            caption: image
+                .caption
+                .replace("{data}", &origins.join("; "))
+                .replace("{name}", &names.join(", ")),
+            names,
+            origins,
             gain: self.gain,
             account,
         }
@@ -297,7 +323,9 @@ impl<'a> Picture<'a> {
             .filter_map(|entry| {
                 let sphere = entry.get_ref();
                 let below = vector::Vec3::from(sphere.centre) - camera.up() * sphere.radius * 1.12;
-                Some((sphere.label.clone()?, camera.project(below)?))
+                let label = sphere.label.as_deref()?;
+                let title = self.tracer.shelf.title(sphere.material.get_ref());
+                Some((label.replace("{name}", title), camera.project(below)?))
             })
             .collect()
     }

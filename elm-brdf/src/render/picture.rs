@@ -73,7 +73,11 @@ impl Bitmap {
     pub fn captioned(rendering: &Rendering) -> Self {
         let mut picture = Self::display(rendering);
         for (label, [x, y]) in &rendering.labels {
-            picture.write(label, [*x as i32, *y as i32], Alignment::Center);
+            // Half of what the label takes, so that its ends stay inside.
+            let half =
+                f64::from(font(picture.width).character_size.width) * label.len() as f64 / 2.0;
+            let x = x.min(f64::from(picture.width) - half).max(half);
+            picture.write(label, [x as i32, *y as i32], Alignment::Center);
         }
         picture.caption(&rendering.caption);
         picture

@@ -120,7 +120,7 @@ pub struct Image {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// Samples per pixel, at most [`Scene::MAX_SAMPLES`].
+    /// Samples per pixel, at most [`Scene::MAX_SAMPLES`]; a single one is taken at the centre.
     #[serde(default = "default_samples")]
     pub samples: u32,
     /// Stops by which the PNG is made brighter; the EXR is as computed.
@@ -177,6 +177,8 @@ pub struct Material {
     /// What is fitted to measurements: `elm` (if not given), `interpolation`, which passes through
     /// them, or one of the names of [`reference::Analytic`](crate::reference::Analytic).
     pub fit: Option<String>,
+    /// Neurons of a network that is fitted.
+    pub neurons: Option<usize>,
     /// A saved model.
     pub model: Option<PathBuf>,
     /// A formula: `lambert`, `oren-nayar`, `ward` or `ggx`.

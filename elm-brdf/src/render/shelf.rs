@@ -13,6 +13,8 @@ use crate::error::{Error, Result};
 pub(crate) struct Shelf<'a> {
     scene: &'a Scene,
     supply: &'a dyn Supply,
+    /// Whether to fit smaller networks as well.
+    economise: bool,
     slots: Vec<Slot<'a>>,
 }
 
@@ -27,12 +29,14 @@ struct Slot<'a> {
 pub(crate) struct Stocked {
     pub(crate) material: Material,
     pub(crate) origin: String,
+    /// What the data call it.
+    pub(crate) title: Option<String>,
     /// How long it took.
     pub(crate) seconds: f64,
 }
 
 impl<'a> Shelf<'a> {
-    pub(crate) fn new(scene: &'a Scene, supply: &'a dyn Supply) -> Self {
+    pub(crate) fn new(scene: &'a Scene, supply: &'a dyn Supply, economise: bool) -> Self {
         let slot = |name| Slot {
             name,
             material: OnceLock::new(),
@@ -41,6 +45,7 @@ impl<'a> Shelf<'a> {
         Self {
             scene,
             supply,
+            economise,
             slots: scene
                 .material
                 .keys()
@@ -86,10 +91,14 @@ impl<'a> Shelf<'a> {
                 .into());
             }
             let supplied = self.supply.supply(definition, &dir)?;
-            let material = Material::new(supplied.brdf, tint, definition.conserve_energy)?;
+            let mut material = Material::new(supplied.brdf, tint, definition.conserve_energy)?;
+            if self.economise {
+                material.economise()?;
+            }
             Ok(Stocked {
                 material,
                 origin: supplied.origin,
+                title: supplied.name,
                 seconds: start.elapsed().as_secs_f64(),
             })
         };
@@ -111,11 +120,19 @@ impl<'a> Shelf<'a> {
             .map(|slot| (slot.name, slot.material.get()))
     }
 
+    /// What the data call a material, or the scene where it has not been made.
+    pub(crate) fn title<'b>(&'b self, name: &'b str) -> &'b str {
+        let slot = self.slots.iter().find(|slot| slot.name == name);
+        slot.and_then(|slot| slot.material.get())
+            .and_then(|stocked| stocked.title.as_deref())
+            .unwrap_or(name)
+    }
+
     /// The distinct origins of those made so far.
-    pub(crate) fn origins(&self) -> Vec<&str> {
-        let mut origins: Vec<&str> = self
+    pub(crate) fn origins(&self) -> Vec<String> {
+        let mut origins: Vec<String> = self
             .stocked()
-            .filter_map(|(_, s)| Some(s?.origin.as_str()))
+            .filter_map(|(_, s)| Some(s?.origin.clone()))
             .collect();
         origins.sort_unstable();
         origins.dedup();

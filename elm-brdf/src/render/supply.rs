@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use elm_datasets::{
-    Directions, Invalid, Measurements, Samples, analytic, curet, synthetic,
-};
+use elm::solve::Ridge;
+use elm::{Activation, ElmParams};
+use elm_datasets::{Directions, Invalid, Measurements, Samples, analytic, curet, synthetic};
 use ndarray::Array2;
 
 use super::scene;
@@ -13,6 +13,7 @@ use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::geometry::{Pair, pairs};
 use crate::link::Link;
+use crate::model::BrdfParams;
 use crate::reference;
 
 /// A model and where it comes from, in a word: "CUReT", "stand-in", a file's name, "analytic".
@@ -21,6 +22,8 @@ pub struct Supplied {
     pub brdf: Box<dyn Brdf>,
     /// The data.
     pub origin: String,
+    /// What the data call the material, if they do.
+    pub name: Option<String>,
 }
 
 /// Something that makes the models of materials.
@@ -36,8 +39,30 @@ pub trait Supply: Sync {
 pub struct Library {
     /// Folder of CUReT's files; `None` for the stand-in.
     pub curet: Option<PathBuf>,
-    /// What fits a network, `fit = "elm"`.
-    pub network: Box<dyn Fit + Send + Sync>,
+    /// What fits a network, `fit = "elm"`, to measurements, given how many there are and how many
+    /// neurons the scene asks for.
+    pub network: Box<Recipe>,
+}
+
+/// Chooses a network by the number of measurements and the neurons asked for.
+pub type Recipe = dyn Fn(usize, Option<usize>) -> Box<dyn Fit> + Send + Sync;
+
+/// A [`Recipe`]: reciprocal inputs, logarithmic target, sine neurons, ridge by leave-one-out; 100
+/// neurons for a few hundred measurements, and 256 and inputs that spread out highlights for many.
+#[must_use]
+pub fn default_network(measurements: usize, neurons: Option<usize>) -> Box<dyn Fit> {
+    let (features, usual) = match measurements {
+        0..1000 => (Features::ReciprocalCosines, 100),
+        _ => (Features::Highlight, 256),
+    };
+    Box::new(BrdfParams {
+        features,
+        link: Link::default_log(),
+        network: ElmParams::new(neurons.unwrap_or(usual))
+            .activation(Activation::Sine)
+            .solver(Ridge::leave_one_out())
+            .seed(1),
+    })
 }
 
 /// The stand-in's seed.
@@ -45,16 +70,16 @@ const STAND_IN_SEED: u64 = 1;
 
 /// What measurements are turned into: the values of a scene's `fit`.
 enum Method<'a> {
-    Network(&'a dyn Fit),
+    Network(&'a Recipe, Option<usize>),
     Interpolation,
     Formula(reference::Analytic),
 }
 
 impl Library {
-    /// The method of this name.
-    fn method(&self, name: Option<&str>) -> Result<Method<'_>> {
-        match name {
-            None | Some("elm") => Ok(Method::Network(&*self.network)),
+    /// The method that a scene asks for.
+    fn method(&self, material: &scene::Material) -> Result<Method<'_>> {
+        match material.fit.as_deref() {
+            None | Some("elm") => Ok(Method::Network(&*self.network, material.neurons)),
             Some("interpolation") => Ok(Method::Interpolation),
             Some(name) => reference::Analytic::ALL
                 .into_iter()
@@ -74,17 +99,17 @@ impl Library {
     }
 
     /// The measurements of a material of CUReT or of the stand-in, and what a caption calls them.
-    fn measurements(&self, name: &str) -> Result<(Measurements, String)> {
+    fn measurements(&self, name: &str) -> Result<(Measurements, &'static str)> {
         let id = match (&self.curet, name.parse()) {
             // A scene made for CUReT renders with the stand-in too, which has names of its own.
             (None, Err(_)) => synthetic::find(name)?,
             (_, found) => found?,
         };
         Ok(match &self.curet {
-            Some(dir) => (curet::read(dir, &[id], Invalid::Clamp)?, "CUReT".to_owned()),
+            Some(dir) => (curet::read(dir, &[id], Invalid::Clamp)?, "CUReT"),
             None => (
                 synthetic::measurements(STAND_IN_SEED, &[id], Invalid::Clamp),
-                "the synthetic stand-in".to_owned(),
+                "the synthetic stand-in",
             ),
         })
     }
@@ -95,7 +120,10 @@ impl Method<'_> {
         let pairs = pairs(&samples.directions);
         let values = samples.values.view();
         let (brdf, how) = match self {
-            Self::Network(fit) => (fit.fit(&pairs, values)?, "ELM fitted to".to_owned()),
+            Self::Network(recipe, neurons) => {
+                let fit = recipe(pairs.len(), *neurons);
+                (fit.fit(&pairs, values)?, "ELM fitted to".to_owned())
+            }
             Self::Interpolation => {
                 let interpolation = reference::RadialBasis {
                     features: Features::ReciprocalCosines,
@@ -116,6 +144,7 @@ impl Method<'_> {
         Ok(Supplied {
             brdf,
             origin: format!("{how} {data}"),
+            name: None,
         })
     }
 }
@@ -131,21 +160,30 @@ impl Supply for Library {
         } = material;
         match (curet, csv, model, analytic) {
             (Some(name), None, None, None) => {
-                let method = self.method(material.fit.as_deref())?;
+                let method = self.method(material)?;
                 let (measurements, data) = self.measurements(name)?;
                 let samples = measurements
                     .samples(0)
-                    .ok_or_else(|| no_measurements(&data))?;
-                method.fit(&samples, &data)
+                    .ok_or_else(|| no_measurements(data))?;
+                let material = measurements
+                    .materials
+                    .first()
+                    .ok_or_else(|| no_measurements(data))?;
+                let title = format!("{} {}", material.id, material.name);
+                Ok(Supplied {
+                    name: Some(title),
+                    ..method.fit(&samples, data)?
+                })
             }
             (None, Some(file), None, None) => {
-                let method = self.method(material.fit.as_deref())?;
+                let method = self.method(material)?;
                 method.fit(&read_csv(&dir.join(file))?, &file.display().to_string())
             }
             (None, None, Some(path), None) => Err(Error::NoModelFiles { path: path.clone() }),
             (None, None, None, Some(name)) => Ok(Supplied {
                 brdf: Box::new(Analytic::from_scene(name, material)?),
-                origin: "analytic".to_owned(),
+                origin: "a formula".to_owned(),
+                name: None,
             }),
             _ => Err(Error::MaterialSource),
         }

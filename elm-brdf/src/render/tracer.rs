@@ -28,8 +28,12 @@ pub(crate) struct Tracer<'a> {
     /// Surfaces that light may meet.
     pub(crate) depth: u32,
     pub(crate) seed: u32,
+    /// With one, it is taken at the pixel's centre.
+    pub(crate) samples_per_pixel: u32,
     /// What a sample may lose by leaving out dim lights, in radiance.
     pub(crate) tolerance: f64,
+    /// Factor on the radiance before display.
+    pub(crate) gain: f64,
 }
 
 /// What a sample of a pixel found.
@@ -182,7 +186,10 @@ impl Tracer<'_> {
     /// A path from the camera up to what it meets first.
     fn start(&self, pixel: u32, sample: u32) -> Path {
         let seed = pixel_seed(self.seed, pixel);
-        let [x, y, ..] = numbers(seed, sample, Purpose::Pixel);
+        let [x, y, ..] = match self.samples_per_pixel {
+            1 => [0.5; 4],
+            _ => numbers(seed, sample, Purpose::Pixel),
+        };
         let (column, row) = (pixel % self.width, pixel / self.width);
         let ray = self
             .world
@@ -299,22 +306,26 @@ impl Tracer<'_> {
             return Ok(None);
         }
         let pair = vertex.pair(direction);
+        let material = self.shelf.get(vertex.material)?;
         let share = match density {
             Some(density) if scatters => {
-                let other = self
-                    .shelf
-                    .get(vertex.material)?
-                    .pdf(pair.outgoing, pair.incident);
-                power_heuristic(density, other)
+                power_heuristic(density, material.pdf(pair.outgoing, pair.incident))
             }
             _ => 1.0,
         };
+        let weight = scaled(times(path.throughput, arriving), cosine * share);
+        // The first surface's own light adds up over the lights, each with its share of the bound.
+        let steps = 0.5 / self.world.lights.len() as f64;
+        let small = self.savings.networks
+            && surface == 0
+            && material.small_is_enough(&pair, weight, self.gain, steps);
         Ok(Some(Request {
             material: vertex.material,
             pair,
             path: 0,
             light,
-            weight: scaled(times(path.throughput, arriving), cosine * share),
+            weight,
+            small,
             counts: reason.is_none(),
         }))
     }
@@ -377,6 +388,7 @@ impl Tracer<'_> {
             path: 0,
             light: SCATTERED,
             weight: [factor; 3],
+            small: false,
             counts: reason.is_none(),
         }))
     }
