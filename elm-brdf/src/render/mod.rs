@@ -68,6 +68,8 @@ const TILE: u32 = 32;
 /// Samples of every pixel before the first is looked at for stopping.
 const FIRST_SAMPLES: u32 = 4;
 
+/// Samples of every pixel between looks, so that a tile's samples take a few megabytes.
+const MOST_SAMPLES: u32 = 64;
 /// Samples of a picture from which on it is worth fitting smaller networks.
 const SAMPLES_WORTH_ECONOMY: u64 = 1 << 19;
 
@@ -198,10 +200,11 @@ impl<'a> Picture<'a> {
         let mut taken = 0;
         while taken < total && wanted.contains(&true) {
             let until = match taken {
-                _ if !self.tracer.savings.samples => total,
-                0 => FIRST_SAMPLES.min(total),
-                _ => (2 * taken).min(total),
+                _ if !self.tracer.savings.samples => taken + MOST_SAMPLES,
+                0 => FIRST_SAMPLES,
+                _ => taken + taken.min(MOST_SAMPLES),
             };
+            let until = until.min(total);
             tiles(image.width, image.height)
                 .into_par_iter()
                 .try_for_each(|tile| {

@@ -10,8 +10,8 @@ use super::scene::{Scene, Triple};
 use super::shape::{Form, Ray, SurfacePoint};
 use super::vector::{BLACK, Rgb, Vec3};
 
-/// Largest picture, in pixels: 8192 x 8192.
-const MAX_PIXELS: u64 = 1 << 26;
+/// Largest picture, in pixels: 8K fits, and takes some three gigabytes while it is made.
+const MAX_PIXELS: u64 = 1 << 25;
 /// Most lights; each is looked at from each visible point.
 const MAX_LIGHTS: u64 = 1 << 16;
 /// Most surfaces that light may meet on its way.
