@@ -6,9 +6,16 @@ use crate::error::{Error, Result};
 use crate::geometry::Pair;
 
 /// A reflectance model, possibly of several channels, or of several materials side by side.
-pub trait Brdf {
+///
+/// The value of one pair does not depend on the other pairs of a batch, bit for bit.
+pub trait Brdf: Send + Sync {
     /// Number of values per pair of directions.
     fn channels(&self) -> usize;
+
+    /// Multiplications and additions that one pair costs in matrix products; 0 for a formula.
+    fn multiply_adds(&self) -> usize {
+        0
+    }
 
     /// BRDF in 1/sr, without the cosine, at each pair of directions: shape (pairs, channels).
     ///

@@ -21,6 +21,9 @@ pub enum Error {
     #[cfg(feature = "fetch")]
     #[error(transparent)]
     Fetch(#[from] crate::fetch::Error),
+    /// A scene could not be read or rendered.
+    #[error(transparent)]
+    Scene(#[from] crate::render::SceneError),
     /// So many folds are impossible.
     #[error("{folds} folds of {rows} measurements: expected 2 to {rows} folds")]
     Folds {
@@ -38,6 +41,41 @@ pub enum Error {
         rows: usize,
         /// The most that it takes.
         most: usize,
+    },
+    /// A material of a scene that names no source, or several.
+    #[error("expected exactly one of curet, csv, model and analytic")]
+    MaterialSource,
+    /// A saved model that cannot be loaded.
+    #[error("{}: saved models cannot be loaded yet", path.display())]
+    NoModelFiles {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A table of samples without a column that it needs.
+    #[error("{}: there is no column '{column}'", path.display())]
+    MissingColumn {
+        /// The file.
+        path: PathBuf,
+        /// The column's name.
+        column: &'static str,
+    },
+    /// A parameter of a formula out of its range.
+    #[error("{what} is {value}, expected {least} to {most}")]
+    AnalyticValue {
+        /// The parameter.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// The least it may be.
+        least: f64,
+        /// The most it may be.
+        most: f64,
+    },
+    /// A model with a number of channels that is no colour.
+    #[error("a model of {channels} channels cannot be rendered: expected 1 or 3")]
+    Channels {
+        /// Its channels.
+        channels: usize,
     },
     /// A folder that was asked for does not exist.
     #[error("{}: there is no such folder", path.display())]

@@ -42,6 +42,7 @@ pub mod model;
 pub mod protocol;
 pub mod published;
 pub mod reference;
+pub mod render;
 pub mod report;
 
 pub use error::{Error, Result};

@@ -74,6 +74,11 @@ impl Brdf for BrdfModel {
         self.network.outputs()
     }
 
+    fn multiply_adds(&self) -> usize {
+        let neurons = self.network.hidden().neurons();
+        neurons * (self.network.inputs() + self.network.outputs())
+    }
+
     fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
         let targets = self.network.predict(&self.features.compute(pairs))?;
         self.link.to_values(targets)

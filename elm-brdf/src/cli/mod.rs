@@ -6,6 +6,7 @@ mod compare;
 mod data;
 #[cfg(feature = "fetch")]
 mod fetch;
+mod render;
 mod reproduce;
 
 use std::io::{self, Write};
@@ -30,6 +31,7 @@ enum Command {
     Compare(compare::Arguments),
     #[cfg(feature = "fetch")]
     Fetch(fetch::Arguments),
+    Render(render::Arguments),
 }
 
 /// Why a command ended without doing its work.
@@ -62,6 +64,7 @@ pub fn run() -> ExitCode {
     let outcome = match Arguments::try_parse() {
         Ok(Arguments { command }) => match command {
             Command::Reproduce(arguments) => reproduce::run(&arguments),
+            Command::Render(arguments) => render::run(&arguments),
             Command::Compare(arguments) => compare::run(&arguments),
             #[cfg(feature = "fetch")]
             Command::Fetch(arguments) => fetch::run(&arguments),

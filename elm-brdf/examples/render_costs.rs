@@ -1,0 +1,134 @@
+//! What pictures cost: how the time grows with pixels, lights and threads, and what the savings
+//! save on each built-in scene.
+//!
+//! ```text
+//! cargo run --release -p elm-brdf --example render_costs -- [CURET_FOLDER]
+//! ```
+//!
+//! Every time is the median of three; without a folder the stand-in is used.
+
+// A program for a terminal.
+#![allow(clippy::print_stdout)]
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use elm_brdf::render::{
+    BUILTIN_NAMES, Bitmap, Library, Options, Rendering, Savings, Scene, Sheet, builtin,
+    default_network,
+};
+
+type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+
+fn main() -> Outcome<()> {
+    let library = Library {
+        curet: std::env::args_os().nth(1).map(PathBuf::from),
+        network: Box::new(default_network),
+    };
+    growth(&library)?;
+    savings(&library)
+}
+
+/// A render and the median of the seconds that three of it took.
+fn timed(sheet: &Sheet, library: &Library, options: Options) -> Outcome<(Rendering, f64)> {
+    let mut seconds = Vec::new();
+    let mut last = None;
+    for _ in 0..3 {
+        let start = Instant::now();
+        last = Some(sheet.render(library, options, &|_, _| {})?);
+        seconds.push(start.elapsed().as_secs_f64());
+    }
+    seconds.sort_by(f64::total_cmp);
+    Ok((last.ok_or("nothing rendered")?, seconds[1]))
+}
+
+/// A row of learnt spheres under so many lights.
+fn lights(count: usize, width: u32, height: u32) -> Outcome<Sheet> {
+    let mut text = format!(
+        "[image]\nwidth = {width}\nheight = {height}\nsamples = 4\n\
+         [camera]\nposition = [0, 0, 8]\ntarget = [0, 0, 0]\nheight = 2.2\n\
+         [material.m]\ncuret = '39'\n[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'm'\n"
+    );
+    for light in 0..count {
+        let angle = light as f64;
+        let (x, y) = (angle.cos(), angle.sin());
+        text +=
+            &format!("[[directional]]\ntowards = [{x}, {y}, 1.5]\nirradiance = [0.3, 0.3, 0.3]\n");
+    }
+    Ok(Scene::parse(&text, "lights".as_ref())?.into())
+}
+
+fn growth(library: &Library) -> Outcome<()> {
+    let options = Options {
+        savings: Savings::LOSSLESS,
+        threads: 1,
+    };
+    println!("pixels  lights  threads  seconds  evaluations  ns per pixel sample and light");
+    let row = |sheet: &Sheet, count: usize, options: Options| -> Outcome<f64> {
+        let (picture, seconds) = timed(sheet, library, options)?;
+        let pixels = picture.pixels.len();
+        let threads = options.threads;
+        let each = seconds * 1e9 / (4 * pixels * count) as f64;
+        let evaluations = picture.account.done.evaluations;
+        println!(
+            "{pixels:>6} {count:>7} {threads:>8} {seconds:>8.3} {evaluations:>12} {each:>8.0}"
+        );
+        Ok(seconds)
+    };
+    for side in [64, 128, 256] {
+        row(&lights(4, side, side)?, 4, options)?;
+    }
+    for count in [1, 2, 8, 16] {
+        row(&lights(count, 128, 128)?, count, options)?;
+    }
+    let sheet = lights(4, 256, 256)?;
+    let one = row(&sheet, 4, options)?;
+    let two = row(
+        &sheet,
+        4,
+        Options {
+            threads: 2,
+            ..options
+        },
+    )?;
+    println!("two threads give {:.2} times one thread's speed", one / two);
+    Ok(())
+}
+
+fn savings(library: &Library) -> Outcome<()> {
+    println!("\nscene           evaluations     time  mean steps  most steps");
+    let (mut evaluations, mut times, mut count) = (0.0, 0.0, 0.0);
+    for name in BUILTIN_NAMES {
+        let mut sheet = builtin(name, None)?;
+        sheet.resize(480, 300);
+        let with = |savings| {
+            timed(
+                &sheet,
+                library,
+                Options {
+                    savings,
+                    threads: 1,
+                },
+            )
+        };
+        let (brute, slow) = with(Savings::NONE)?;
+        let (saved, fast) = with(Savings::ALL)?;
+        let fewer = brute.account.done.evaluations as f64 / saved.account.done.evaluations as f64;
+        let faster = slow / fast;
+        let (a, b) = (Bitmap::display(&brute), Bitmap::display(&saved));
+        let steps = a.bytes().iter().zip(b.bytes()).map(|(a, b)| a.abs_diff(*b));
+        let most = steps.clone().max().unwrap_or(0);
+        let mean = steps.map(f64::from).sum::<f64>() / a.bytes().len() as f64;
+        println!("{name:<15} {fewer:>10.2}x {faster:>7.2}x {mean:>11.3} {most:>11}");
+        evaluations += fewer.ln();
+        times += faster.ln();
+        count += 1.0;
+    }
+    let mean = |sum: f64| (sum / count).exp();
+    println!(
+        "geometric mean  {:>10.2}x {:>7.2}x",
+        mean(evaluations),
+        mean(times)
+    );
+    Ok(())
+}

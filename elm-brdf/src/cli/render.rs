@@ -1,0 +1,164 @@
+//! `elm-brdf render`: a picture of a scene, and the account of the work.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::data::Source;
+use super::{Failure, print, say};
+use crate::error::Error;
+use crate::render::scene::Image;
+use crate::render::{
+    Account, Library, Options, Rendering, Savings, Scene, Sheet, builtin, default_network,
+};
+
+/// Render a scene with learnt materials.
+///
+/// SCENE is a TOML file or a built-in scene: builtin:materials, builtin:contact-sheet,
+/// builtin:comparison or builtin:mesh. Measurements are looked for as by 'reproduce'; without CUReT's files its materials come from the built-in
+/// stand-in, and the caption says so.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// TOML file, or builtin:NAME.
+    scene: String,
+    /// The picture: .png (sRGB, with captions) or .exr (linear radiance).
+    #[arg(short, long, value_name = "IMAGE")]
+    output: PathBuf,
+    /// Folder of CUReT files.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// For a built-in scene, the material by CUReT's number or name.
+    #[arg(long, value_name = "NAME")]
+    material: Option<String>,
+    /// Pixels across and down, such as 640x360, instead of the scene's.
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    size: Option<(u32, u32)>,
+    /// Samples per pixel instead of the scene's.
+    #[arg(long, value_name = "N")]
+    samples: Option<u32>,
+    /// Stops by which to brighten the PNG instead of the scene's.
+    #[arg(long, value_name = "STOPS", allow_negative_numbers = true)]
+    exposure: Option<f64>,
+    /// Surfaces that light may meet on its way instead of the scene's: 1 is direct light.
+    #[arg(long, value_name = "N")]
+    depth: Option<u32>,
+    /// Seed of the samples instead of the scene's.
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
+    /// Worker threads; the picture does not depend on them. 0: as many as the machine has.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Write what was done and what was skipped to FILE as JSON, and print it.
+    #[arg(long, value_name = "FILE")]
+    account: Option<PathBuf>,
+    /// Brute force: skip nothing.
+    #[arg(long, conflicts_with = "without")]
+    no_skip: bool,
+    /// Savings not to make, with commas between.
+    #[arg(long, value_name = "LIST", value_delimiter = ',',
+          value_parser = PossibleValuesParser::new(Savings::NAMES))]
+    without: Vec<String>,
+}
+
+/// Reads WIDTHxHEIGHT.
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let parts = text
+        .split_once('x')
+        .and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    parts.ok_or_else(|| "expected WIDTHxHEIGHT, such as 640x360".to_owned())
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    Rendering::format(&arguments.output).map_err(|error| Failure::Usage(error.to_string()))?;
+    let mut sheet = match arguments.scene.strip_prefix("builtin:") {
+        Some(name) => builtin(name, arguments.material.as_deref())
+            .map_err(|e| Failure::Usage(e.to_string()))?,
+        None => Scene::read(Path::new(&arguments.scene))
+            .map_err(Error::from)?
+            .into(),
+    };
+    arguments.amend(&mut sheet);
+    let library = library(arguments.data.as_deref())?;
+    let options = Options {
+        savings: arguments.savings(),
+        threads: arguments.threads,
+    };
+    let progress = progress();
+    let rendering = sheet.render(&library, options, &|done, all| {
+        progress.set_length(all);
+        progress.set_position(done);
+    });
+    progress.finish_and_clear();
+    let rendering = rendering?;
+    for note in &rendering.account.notes {
+        say(&format!("note: {note}"));
+    }
+    rendering.write(&arguments.output)?;
+    match &arguments.account {
+        Some(path) => account(path, &rendering.account),
+        None => Ok(()),
+    }
+}
+
+impl Arguments {
+    /// Puts what was typed in place of what the scene says.
+    fn amend(&self, sheet: &mut Sheet) {
+        if let Some((width, height)) = self.size {
+            sheet.resize(width, height);
+        }
+        for scene in sheet.scenes() {
+            self.amend_image(&mut scene.image);
+        }
+    }
+
+    fn amend_image(&self, image: &mut Image) {
+        image.samples = self.samples.unwrap_or(image.samples);
+        image.exposure = self.exposure.unwrap_or(image.exposure);
+        image.depth = self.depth.unwrap_or(image.depth);
+        image.seed = self.seed.unwrap_or(image.seed);
+    }
+
+    fn savings(&self) -> Savings {
+        if self.no_skip {
+            return Savings::NONE;
+        }
+        // clap lets no other name through.
+        let without = |savings: Savings, name: &String| savings.without(name).unwrap_or(savings);
+        self.without.iter().fold(Savings::ALL, without)
+    }
+}
+
+/// Where a scene's materials come from.
+fn library(named: Option<&Path>) -> Result<Library, Failure> {
+    let curet = match Source::find(named)? {
+        Source::Curet(dir) => Some(dir),
+        Source::Synthetic => None,
+    };
+    Ok(Library {
+        curet,
+        network: Box::new(default_network),
+    })
+}
+
+/// Prints the account and writes it as JSON.
+fn account(path: &Path, account: &Account) -> Result<(), Failure> {
+    print(&account.to_string())?;
+    let unwritten = |reason| Error::Write {
+        path: path.to_owned(),
+        reason,
+    };
+    let mut json = serde_json::to_string_pretty(account).map_err(|e| unwritten(e.into()))?;
+    json.push('\n');
+    fs::write(path, json).map_err(unwritten)?;
+    Ok(())
+}
+
+fn progress() -> ProgressBar {
+    // indicatif draws on standard error, and not at all where that is no terminal.
+    let bar = ProgressBar::new(0);
+    let style = ProgressStyle::with_template("{bar:40} {percent}% of the samples, {eta} left");
+    bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}

@@ -1,0 +1,116 @@
+//! Evaluations gathered from many paths and carried out by material.
+
+use std::time::Instant;
+
+use super::account::{Reason, Savings, Tally};
+use super::shelf::Shelf;
+use super::vector::{BLACK, Rgb};
+use crate::error::Result;
+use crate::geometry::Pair;
+
+/// One evaluation that a path waits for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Request {
+    pub(crate) material: usize,
+    pub(crate) pair: Pair,
+    /// Index of the path.
+    pub(crate) path: usize,
+    /// The light, or [`SCATTERED`].
+    pub(crate) light: usize,
+    /// Factor on the value.
+    pub(crate) weight: Rgb,
+    /// Whether the smaller network is enough.
+    pub(crate) small: bool,
+    /// Whether the value counts; brute force evaluates also what does not.
+    pub(crate) counts: bool,
+}
+
+/// Stands for a drawn direction instead of a light.
+pub(crate) const SCATTERED: usize = usize::MAX;
+
+/// Requests up to this many are gathered: enough to fill the evaluator's tiles, and a few
+/// megabytes.
+pub(crate) const CAPACITY: usize = 16_384;
+
+/// Gathered requests and their values.
+#[derive(Default)]
+pub(crate) struct Batch {
+    pub(crate) requests: Vec<Request>,
+    /// One per request, once evaluated.
+    pub(crate) values: Vec<Rgb>,
+    order: Vec<usize>,
+    pairs: Vec<Pair>,
+    /// For each request in order, the pair that stands for it.
+    pair_of: Vec<usize>,
+}
+
+impl Batch {
+    pub(crate) fn clear(&mut self) {
+        self.requests.clear();
+        self.values.clear();
+    }
+
+    /// Fills [`values`](Self::values), material by material.
+    pub(crate) fn evaluate(
+        &mut self,
+        shelf: &Shelf<'_>,
+        savings: Savings,
+        tally: &mut Tally,
+    ) -> Result<()> {
+        let Self {
+            requests,
+            values,
+            order,
+            pairs,
+            pair_of,
+        } = self;
+        values.clear();
+        values.resize(requests.len(), BLACK);
+        order.clear();
+        order.extend(0..requests.len());
+        // A stable sort: equal pairs are neighbours where a light and a view are the same.
+        let network = |at: usize| (requests[at].material, requests[at].small);
+        order.sort_by_key(|&at| (network(at), requests[at].light));
+        for group in order.chunk_by(|&a, &b| network(a) == network(b)) {
+            let (index, small) = network(group[0]);
+            let material = shelf.get(index)?;
+            let start = Instant::now();
+            pairs.clear();
+            pair_of.clear();
+            for &at in group {
+                let pair = requests[at].pair;
+                if !(savings.repeated && pairs.last() == Some(&pair)) {
+                    pairs.push(pair);
+                }
+                pair_of.push(pairs.len() - 1);
+            }
+            let found = if small {
+                material.eval_small(pairs)?
+            } else {
+                material.eval(pairs)?
+            };
+            // Without colour each channel is the same network again.
+            let times = if material.channels() == 1 { 3 } else { 1 };
+            let done = pairs.len() as u64;
+            tally.skip(Reason::Repeated, index, group.len() as u64 - done);
+            tally.evaluations[index] += done;
+            if small {
+                tally.small[index] += done;
+            }
+            if savings.channels {
+                tally.skip(Reason::OneChannel, index, (times - 1) * done);
+            } else {
+                for _ in 1..times {
+                    // Brute force, and the same again.
+                    std::hint::black_box(material.eval(pairs)?);
+                    tally.evaluations[index] += done;
+                }
+            }
+            for (&at, &pair) in group.iter().zip(pair_of.iter()) {
+                values[at] = found[pair];
+            }
+            tally.evaluation_seconds += start.elapsed().as_secs_f64();
+        }
+        Ok(())
+    }
+}

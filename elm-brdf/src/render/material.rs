@@ -1,0 +1,207 @@
+//! A material as the renderer uses it: any [`Brdf`] made safe, with a way to sample it.
+
+use ndarray::Array2;
+
+use super::economy::Economy;
+use super::proxy::{Proxy, Survey};
+use super::vector::{Rgb, largest, luminance, scaled, times};
+use crate::brdf::Brdf;
+use crate::error::{Error, Result};
+use crate::geometry::{Pair, Vector};
+
+/// A model may pass the largest value of its [`Survey`] by this factor; beyond, it is cut off.
+const CEILING_MARGIN: f64 = 2.0;
+
+/// A reflectance model ready for rendering.
+///
+/// Values are never negative, never without number, and never above a ceiling, twice the largest
+/// value among some thousand directions, mirror and retro-reflection included. That bound lets
+/// the renderer leave out what cannot be seen.
+///
+/// ```
+/// use elm_brdf::geometry::{Pair, cartesian};
+/// use elm_brdf::render::{Analytic, Material};
+/// let chalk = Material::new(Box::new(Analytic::lambert(0.8)), [1.0; 3], false)?;
+/// let outgoing = cartesian(0.5, 0.0);
+/// let (incident, density) = chalk.sample(outgoing, [0.3, 0.7]);
+/// assert!((chalk.pdf(outgoing, incident) / density - 1.0).abs() < 1e-9);
+/// let value = chalk.eval(&[Pair { incident, outgoing }])?[0][0];
+/// assert!((value - 0.8 / std::f64::consts::PI).abs() < 1e-12);
+/// assert!((chalk.albedo()[0].1 - 0.8).abs() < 0.01);
+/// # Ok::<(), elm_brdf::Error>(())
+/// ```
+pub struct Material {
+    brdf: Box<dyn Brdf>,
+    /// Factor on each channel.
+    factor: Rgb,
+    ceiling: f64,
+    proxy: Proxy,
+    albedo: f64,
+    economy: Option<Economy>,
+}
+
+impl Material {
+    /// Prepares a model of one channel or three; `tint` multiplies it. With `conserve_energy` it
+    /// is scaled down so that no directional albedo passes 1.
+    ///
+    /// # Errors
+    /// [`Error::Channels`] for a model of another number of channels; whatever the model's own
+    /// evaluation reports.
+    pub fn new(brdf: Box<dyn Brdf>, tint: Rgb, conserve_energy: bool) -> Result<Self> {
+        let channels = brdf.channels();
+        if channels != 1 && channels != 3 {
+            return Err(Error::Channels { channels });
+        }
+        let survey = Survey::new();
+        let raw =
+            |pairs: &[Pair]| -> Result<Vec<Rgb>> { Ok(rows(&brdf.eval(pairs)?, f64::INFINITY)) };
+        let cells = raw(&survey.cells)?;
+        let highest = cells
+            .iter()
+            .chain(&raw(&survey.peaks)?)
+            .map(|&value| largest(value))
+            .fold(0.0, f64::max);
+        let grey: Vec<f64> = cells
+            .iter()
+            .map(|&value| luminance(times(value, tint)))
+            .collect();
+        let proxy = Proxy::new(&grey);
+        let largest_albedo = (0..3)
+            .map(|channel| {
+                let values: Vec<f64> = cells.iter().map(|v| v[channel] * tint[channel]).collect();
+                let albedo = Proxy::new(&values);
+                albedo
+                    .albedo()
+                    .map(|(_, albedo)| albedo)
+                    .fold(0.0, f64::max)
+            })
+            .fold(0.0, f64::max);
+        let scale = if conserve_energy && largest_albedo > 1.0 {
+            1.0 / largest_albedo
+        } else {
+            1.0
+        };
+        Ok(Self {
+            brdf,
+            factor: scaled(tint, scale),
+            ceiling: CEILING_MARGIN * highest,
+            proxy,
+            albedo: largest_albedo,
+            economy: None,
+        })
+    }
+
+    /// Fits a smaller network to the model, for where its error cannot be seen.
+    pub(crate) fn economise(&mut self) -> Result<()> {
+        self.economy = Economy::new(&*self.brdf)?;
+        Ok(())
+    }
+
+    /// Whether the smaller network will do, as [`Economy::is_enough`].
+    pub(crate) fn small_is_enough(&self, pair: &Pair, weight: Rgb, gain: f64, steps: f64) -> bool {
+        let weight = times(weight, self.factor);
+        self.economy
+            .as_ref()
+            .is_some_and(|small| small.is_enough(pair, weight, gain, steps))
+    }
+
+    /// As [`eval`](Self::eval), by the smaller network if there is one.
+    pub(crate) fn eval_small(&self, pairs: &[Pair]) -> Result<Vec<Rgb>> {
+        let brdf = self.economy.as_ref().map_or(&*self.brdf, Economy::brdf);
+        self.eval_by(brdf, pairs)
+    }
+
+    /// Multiplications and additions of one evaluation by the smaller network.
+    pub(crate) fn small_multiply_adds(&self) -> usize {
+        self.economy
+            .as_ref()
+            .map_or(0, |small| small.brdf().multiply_adds())
+    }
+
+    /// BRDF in 1/sr of each pair, as linear red, green and blue.
+    ///
+    /// # Errors
+    /// Whatever the model's own evaluation reports.
+    pub fn eval(&self, pairs: &[Pair]) -> Result<Vec<Rgb>> {
+        self.eval_by(&*self.brdf, pairs)
+    }
+
+    fn eval_by(&self, brdf: &dyn Brdf, pairs: &[Pair]) -> Result<Vec<Rgb>> {
+        let mut values = rows(&brdf.eval(pairs)?, self.ceiling);
+        for value in &mut values {
+            *value = times(*value, self.factor);
+        }
+        Ok(values)
+    }
+
+    /// Draws an incident direction for a viewer at `outgoing`, from two numbers in \[0, 1), with
+    /// its density in solid angle: about in proportion to the model times the cosine, mixed with
+    /// the cosine alone.
+    #[must_use]
+    pub fn sample(&self, outgoing: Vector, u: [f64; 2]) -> (Vector, f64) {
+        self.proxy.sample(outgoing, u)
+    }
+
+    /// The density in solid angle of [`sample`](Self::sample).
+    #[must_use]
+    pub fn pdf(&self, outgoing: Vector, incident: Vector) -> f64 {
+        self.proxy.density(outgoing, incident)
+    }
+
+    /// Directional albedo, as luminance: the part of light from `theta_o` (radians) that is
+    /// reflected, for each of some angles (theta_o, albedo).
+    #[must_use]
+    pub fn albedo(&self) -> Vec<(f64, f64)> {
+        self.proxy.albedo().collect()
+    }
+
+    /// The largest directional albedo of any channel before any rescaling; above 1 the model
+    /// makes light of nothing.
+    #[must_use]
+    pub fn largest_albedo(&self) -> f64 {
+        self.albedo
+    }
+
+    /// No value of [`eval`](Self::eval) is larger, channel by channel.
+    #[must_use]
+    pub fn ceiling(&self) -> Rgb {
+        scaled(self.factor, self.ceiling)
+    }
+
+    /// Number of channels that are evaluated.
+    #[must_use]
+    pub fn channels(&self) -> usize {
+        self.brdf.channels()
+    }
+
+    /// Multiplications and additions of one evaluation.
+    #[must_use]
+    pub fn multiply_adds(&self) -> usize {
+        self.brdf.multiply_adds()
+    }
+}
+
+impl std::fmt::Debug for Material {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Material")
+            .field("channels", &self.channels())
+            .field("ceiling", &self.ceiling)
+            .field("albedo", &self.albedo)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Rows of one or three values as colours between 0 and `ceiling`.
+fn rows(values: &Array2<f64>, ceiling: f64) -> Vec<Rgb> {
+    // In this order also no number becomes 0, and infinity the ceiling.
+    let safe = |value: f64| value.max(0.0).min(ceiling);
+    let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
+    values
+        .rows()
+        .into_iter()
+        .map(|row| match row.len() {
+            1 => [finite(safe(row[0])); 3],
+            _ => [0, 1, 2].map(|channel| finite(safe(row[channel]))),
+        })
+        .collect()
+}

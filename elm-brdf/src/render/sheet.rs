@@ -1,0 +1,188 @@
+//! Several pictures as one.
+
+use super::account::Account;
+use super::error::SceneError;
+use super::scene::Scene;
+use super::supply::Supply;
+use super::{Options, Rendering, render};
+use crate::error::Result;
+
+/// Pictures of one size in rows and columns, rendered as one picture.
+#[derive(Debug, Clone)]
+pub struct Sheet {
+    /// Pictures in a row.
+    pub columns: usize,
+    /// Row by row.
+    pub panels: Vec<Panel>,
+    /// Words at the foot, with `{data}` for where the materials come from, and `{name}` for what
+    /// those of the first panel are called.
+    pub caption: String,
+}
+
+/// One picture of a sheet.
+#[derive(Debug, Clone)]
+pub struct Panel {
+    /// Words at its head, with `{name}` for the name of its only material.
+    pub title: String,
+    /// What it shows.
+    pub content: Content,
+}
+
+/// What a panel shows.
+#[derive(Debug, Clone)]
+pub enum Content {
+    /// A scene.
+    Scene(Box<Scene>),
+    /// How two panels before it differ: `factor` times the absolute difference of radiance.
+    Difference {
+        /// Index of one panel.
+        of: usize,
+        /// Index of the other.
+        from: usize,
+        /// Factor on the difference.
+        factor: f64,
+    },
+}
+
+impl From<Scene> for Sheet {
+    /// A sheet with nothing else on it.
+    fn from(scene: Scene) -> Self {
+        Self {
+            columns: 1,
+            caption: scene.image.caption.clone(),
+            panels: vec![Panel {
+                title: String::new(),
+                content: Content::Scene(Box::new(scene)),
+            }],
+        }
+    }
+}
+
+impl Sheet {
+    /// The scenes on it.
+    pub fn scenes(&mut self) -> impl Iterator<Item = &mut Scene> {
+        self.panels
+            .iter_mut()
+            .filter_map(|panel| match &mut panel.content {
+                Content::Scene(scene) => Some(&mut **scene),
+                Content::Difference { .. } => None,
+            })
+    }
+
+    /// Makes the whole sheet about so many pixels across and down.
+    pub fn resize(&mut self, width: u32, height: u32) {
+        let columns = self.columns.max(1) as u32;
+        let rows = self.panels.len().div_ceil(columns as usize).max(1) as u32;
+        for scene in self.scenes() {
+            (scene.image.width, scene.image.height) = (width / columns, height / rows);
+        }
+    }
+
+    /// Renders every panel, as [`render`] does one scene; all have the size and the exposure of
+    /// the first.
+    ///
+    /// # Errors
+    /// As [`render`]; [`SceneError::Sheet`] for panels of different sizes, and for a difference
+    /// from a panel that does not come before it.
+    pub fn render(
+        &self,
+        supply: &dyn Supply,
+        options: Options,
+        progress: &(dyn Fn(u64, u64) + Sync),
+    ) -> Result<Rendering> {
+        let count = self.panels.len() as u64;
+        let mut done: Vec<Rendering> = Vec::with_capacity(self.panels.len());
+        for (index, panel) in self.panels.iter().enumerate() {
+            let rendering = match &panel.content {
+                Content::Scene(scene) => render(scene, supply, options, &|part, whole| {
+                    // Panels of one size take about as long as each other.
+                    progress(index as u64 * whole + part, count * whole);
+                })?,
+                Content::Difference { of, from, factor } => {
+                    match (done.get(*of), done.get(*from)) {
+                        (Some(a), Some(b)) if a.pixels.len() == b.pixels.len() => {
+                            difference(a, b, *factor)
+                        }
+                        _ => return Err(SceneError::Sheet { panel: index }.into()),
+                    }
+                }
+            };
+            done.push(rendering);
+        }
+        Ok(self.compose(&done)?)
+    }
+
+    fn compose(&self, panels: &[Rendering]) -> Result<Rendering, SceneError> {
+        if let ([only], [Panel { title, .. }]) = (panels, &*self.panels)
+            && title.is_empty()
+        {
+            return Ok(only.clone());
+        }
+        let Some(first) = panels.first() else {
+            return Err(SceneError::Sheet { panel: 0 });
+        };
+        let (width, height) = (first.width as usize, first.height as usize);
+        let columns = self.columns.clamp(1, panels.len());
+        let rows = panels.len().div_ceil(columns);
+        let mut pixels = vec![[0.0; 3]; columns * width * rows * height];
+        let mut labels = Vec::new();
+        let mut account = Account::default();
+        let mut origins: Vec<String> = Vec::new();
+        for (index, (panel, rendering)) in self.panels.iter().zip(panels).enumerate() {
+            if (rendering.width, rendering.height) != (first.width, first.height) {
+                return Err(SceneError::Sheet { panel: index });
+            }
+            let (left, top) = (index % columns * width, index / columns * height);
+            for (row, line) in rendering.pixels.chunks_exact(width).enumerate() {
+                let start = (top + row) * columns * width + left;
+                pixels[start..start + width].copy_from_slice(line);
+            }
+            let (x, y) = (left as f64, top as f64);
+            labels.extend(
+                rendering
+                    .labels
+                    .iter()
+                    .map(|(l, [u, v])| (l.clone(), [x + u, y + v])),
+            );
+            if !panel.title.is_empty() {
+                let title = panel.title.replace("{name}", &rendering.names.join(", "));
+                labels.push((title, [x + width as f64 / 2.0, y + 2.0]));
+            }
+            account.merge(&rendering.account, index);
+            for origin in &rendering.origins {
+                if !origins.contains(origin) {
+                    origins.push(origin.clone());
+                }
+            }
+        }
+        Ok(Rendering {
+            width: (columns * width) as u32,
+            height: (rows * height) as u32,
+            pixels,
+            labels,
+            caption: self
+                .caption
+                .replace("{data}", &origins.join("; "))
+                .replace("{name}", &first.names.join(", ")),
+            gain: first.gain,
+            names: Vec::new(),
+            origins,
+            account,
+        })
+    }
+}
+
+fn difference(a: &Rendering, b: &Rendering, factor: f64) -> Rendering {
+    let pixels = a.pixels.iter().zip(&b.pixels);
+    Rendering {
+        pixels: pixels
+            .map(|(p, q)| [0, 1, 2].map(|c| factor * (p[c] - q[c]).abs()))
+            .collect(),
+        labels: Vec::new(),
+        caption: String::new(),
+        names: Vec::new(),
+        origins: Vec::new(),
+        account: Account::default(),
+        ..*a
+    }
+}

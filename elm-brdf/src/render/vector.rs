@@ -1,0 +1,96 @@
+//! Points and directions in the world, and the frame of a surface.
+
+use crate::geometry::Vector;
+
+/// A point, direction or colour of the world.
+pub(crate) type Vec3 = nalgebra::Vector3<f64>;
+
+/// Linear red, green and blue.
+pub(crate) type Rgb = [f64; 3];
+
+/// No light.
+pub(crate) const BLACK: Rgb = [0.0; 3];
+
+/// Product, channel by channel.
+pub(crate) fn times(a: Rgb, b: Rgb) -> Rgb {
+    [a[0] * b[0], a[1] * b[1], a[2] * b[2]]
+}
+
+/// Every channel times `factor`.
+pub(crate) fn scaled(a: Rgb, factor: f64) -> Rgb {
+    a.map(|channel| channel * factor)
+}
+
+/// Adds `b` to `a`.
+pub(crate) fn add(a: &mut Rgb, b: Rgb) {
+    for (sum, term) in a.iter_mut().zip(b) {
+        *sum += term;
+    }
+}
+
+/// The largest channel.
+pub(crate) fn largest(a: Rgb) -> f64 {
+    a[0].max(a[1]).max(a[2])
+}
+
+/// Relative luminance of linear sRGB (ITU-R BT.709).
+pub(crate) fn luminance(a: Rgb) -> f64 {
+    0.2126 * a[0] + 0.7152 * a[1] + 0.0722 * a[2]
+}
+
+/// An orthonormal frame with its third axis along a surface normal.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Frame {
+    tangent: Vec3,
+    bitangent: Vec3,
+    /// The third axis.
+    pub(crate) normal: Vec3,
+}
+
+impl Frame {
+    /// A frame about the unit vector `n`, without a branch that makes a seam (Duff et al.,
+    /// *Building an Orthonormal Basis, Revisited*, JCGT 6(1), 2017).
+    pub(crate) fn about(n: Vec3) -> Self {
+        let sign = 1.0_f64.copysign(n.z);
+        let a = -1.0 / (sign + n.z);
+        let b = n.x * n.y * a;
+        Self {
+            tangent: Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
+            bitangent: Vec3::new(b, sign + n.y * n.y * a, -n.y),
+            normal: n,
+        }
+    }
+
+    /// A direction of the world in this frame.
+    pub(crate) fn local(&self, w: &Vec3) -> Vector {
+        [
+            w.dot(&self.tangent),
+            w.dot(&self.bitangent),
+            w.dot(&self.normal),
+        ]
+    }
+
+    /// A direction of this frame in the world.
+    pub(crate) fn world(&self, v: Vector) -> Vec3 {
+        self.tangent * v[0] + self.bitangent * v[1] + self.normal * v[2]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_frame_is_orthonormal_and_goes_there_and_back(
+            theta in 0.0..std::f64::consts::PI, phi in -3.2..3.2_f64,
+        ) {
+            let n = Vec3::from(crate::geometry::cartesian(theta, phi));
+            let frame = Frame::about(n);
+            prop_assert!((frame.tangent.cross(&frame.bitangent) - n).norm() < 1e-14);
+            let w = Vec3::new(0.3, -0.5, 0.8).normalize();
+            prop_assert!((frame.world(frame.local(&w)) - w).norm() < 1e-14);
+        }
+    }
+}

@@ -1,0 +1,511 @@
+//! What holds of pictures: closed forms, conservation of energy, savings that change nothing or
+//! next to nothing, and scenes that cannot be.
+
+// As in tests within the crates.
+#![allow(clippy::unwrap_used)]
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::path::Path;
+
+use elm::{Activation, ElmParams, solve::Ridge};
+use elm_brdf::features::Features;
+use elm_brdf::geometry::{Pair, cartesian};
+use elm_brdf::link::Link;
+use elm_brdf::model::BrdfParams;
+use elm_brdf::render::{
+    Bitmap, Library, Material, Options, Rendering, Savings, Scene, Supply, builtin, render, scene,
+};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Networks small enough for tests, fitted to the stand-in.
+fn library() -> Library {
+    Library {
+        curet: None,
+        network: Box::new(|_, _| {
+            Box::new(BrdfParams {
+                features: Features::ReciprocalCosines,
+                link: Link::default_log(),
+                network: ElmParams::new(40)
+                    .activation(Activation::Tanh)
+                    .solver(Ridge::leave_one_out()),
+            })
+        }),
+    }
+}
+
+fn picture(text: &str, savings: Savings, threads: usize) -> Result<Rendering, elm_brdf::Error> {
+    let scene = Scene::parse(text, Path::new("scene.toml"))?;
+    render(&scene, &library(), Options { savings, threads }, &|_, _| {})
+}
+
+fn head(width: u32, height: u32, more: &str) -> String {
+    format!(
+        "[image]\nwidth = {width}\nheight = {height}\n{more}\n\
+         [camera]\nposition = [0, 0, 8]\ntarget = [0, 0, 0]\nheight = 2\n"
+    )
+}
+
+const SPHERE: &str = "
+[[sphere]]
+centre = [0, 0, 0]
+radius = 1
+material = 'm'
+";
+
+/// Everything at once: soft and hard shadows, a mesh, colours, two materials, two surfaces.
+fn everything() -> String {
+    "
+[image]
+width = 64
+height = 48
+samples = 16
+depth = 2
+[camera]
+position = [0, 2, 7]
+target = [0, 0.2, 0]
+fov = 32
+[material.red]
+analytic = 'ggx'
+albedo = 0.5
+roughness = 0.4
+specular = 0.1
+tint = [0.9, 0.3, 0.2]
+[material.learnt]
+curet = '7'
+[material.unused]
+curet = '8'
+[[sphere]]
+centre = [-0.8, 0, 0]
+radius = 0.8
+material = 'learnt'
+[[mesh]]
+builtin = 'torus-knot'
+scale = 0.6
+translate = [0.9, 0, 0.3]
+material = 'red'
+[[plane]]
+point = [0, -0.8, 0]
+normal = [0, 1, 0]
+material = 'red'
+[[directional]]
+towards = [-1, 2, 1]
+irradiance = [1, 1, 0.9]
+[[point]]
+position = [2, 2, 2]
+intensity = [2, 2, 3]
+[[point]]
+position = [0, 500, 0]
+intensity = [1, 1, 1]
+[[area]]
+corner = [-2, 2.5, 0]
+edge_u = [1, 0, 0]
+edge_v = [0, 0, 1]
+radiance = [2, 2, 2]
+[environment]
+builtin = 'studio'
+radiance = [0.3, 0.3, 0.3]
+"
+    .to_owned()
+}
+
+#[test]
+fn a_lambert_sphere_under_a_directional_light_is_albedo_over_pi_times_the_cosine() {
+    let text = head(33, 33, "samples = 1024")
+        + "[material.m]\nanalytic = 'lambert'\nalbedo = 0.6\n[[directional]]\n\
+           towards = [0, 0, 1]\nirradiance = [2, 2, 2]\n"
+        + SPHERE;
+    let picture = picture(&text, Savings::LOSSLESS, 1).unwrap();
+    // A pixel's mean of the cosine sqrt(1 - r^2), by the midpoint rule on 64 x 64 points.
+    for (column, row) in [(16, 16), (10, 16), (20, 9), (0, 0)] {
+        let mut expected = 0.0;
+        for i in 0..64 {
+            for j in 0..64 {
+                let x = (f64::from(column) + (f64::from(i) + 0.5) / 64.0) / 16.5 - 1.0;
+                let y = (f64::from(row) + (f64::from(j) + 0.5) / 64.0) / 16.5 - 1.0;
+                expected += (1.0 - x * x - y * y).max(0.0).sqrt() / 4096.0;
+            }
+        }
+        let expected = 0.6 / PI * 2.0 * expected;
+        let found = picture.pixels[row as usize * 33 + column as usize][1];
+        // 1024 Sobol points leave a smooth integrand at some 1/1024 of its range.
+        assert!(
+            (found - expected).abs() < 1e-3 * 0.4,
+            "{column} {row}: {found} {expected}"
+        );
+    }
+}
+
+#[test]
+fn a_lambert_plane_under_a_parallel_square_light_has_the_closed_form_irradiance() {
+    // The camera looks from below the light at the point under its centre; see the configuration
+    // factor in the tests of lights: four corners with a = b = 1/4.
+    let a = 0.25_f64;
+    let root = (1.0 + a * a).sqrt();
+    let factor = 4.0 * (2.0 * a / root * (a / root).atan()) / (2.0 * PI);
+    let text = "
+[image]
+width = 1
+height = 1
+samples = 4096
+[camera]
+position = [3, 1, 0]
+target = [0, 0, 0]
+height = 1e-6
+[material.m]
+analytic = 'lambert'
+albedo = 0.5
+[[plane]]
+point = [0, 0, 0]
+normal = [0, 1, 0]
+material = 'm'
+[[area]]
+corner = [-0.5, 2, -0.5]
+edge_u = [1, 0, 0]
+edge_v = [0, 0, 1]
+radiance = [3, 3, 3]
+";
+    let found = picture(text, Savings::LOSSLESS, 1).unwrap().pixels[0][0];
+    let expected = 0.5 * 3.0 * factor;
+    assert!((found / expected - 1.0).abs() < 2e-3, "{found} {expected}");
+}
+
+#[test]
+fn in_a_white_furnace_a_white_surface_disappears() {
+    let text = head(24, 24, "samples = 64")
+        + "[material.m]\nanalytic = 'lambert'\nalbedo = 1\n[environment]\n"
+        + SPHERE;
+    let picture = picture(&text, Savings::LOSSLESS, 2).unwrap();
+    // Both ways of sampling are by the cosine, one of them in cells with a mean error below 1 %.
+    for pixel in &picture.pixels {
+        assert!((pixel[0] - 1.0).abs() < 0.01, "{pixel:?}");
+    }
+}
+
+#[test]
+fn several_bounces_between_white_walls_conserve_energy() {
+    // In a furnace each bounce off albedo 0.5 halves what is left: a closed sphere seen from
+    // within, its wall an environment by itself, cannot be lit; so a convex pair does it. A plane
+    // below a sphere sees sky or sphere; with white surfaces and many bounces both look like sky.
+    let text = head(8, 8, "samples = 256\ndepth = 64")
+        + "[material.m]\nanalytic = 'lambert'\nalbedo = 1\n[environment]\n\
+           [[plane]]\npoint = [0, -1, 0]\nnormal = [0, 1, 0]\nmaterial = 'm'\n"
+        + SPHERE;
+    let picture = picture(&text, Savings::LOSSLESS, 2).unwrap();
+    let mean = picture.pixels.iter().map(|p| p[0]).sum::<f64>() / 64.0;
+    // Russian roulette adds noise; 16384 paths of relative deviation below 1 leave 3 / 128.
+    assert!((mean - 1.0).abs() < 3.0 / 128.0, "{mean}");
+}
+
+#[test]
+fn lossless_savings_give_the_same_picture_bit_for_bit_on_any_number_of_threads() {
+    let reference = picture(&everything(), Savings::NONE, 1).unwrap();
+    assert!(reference.pixels.iter().flatten().all(|v| v.is_finite()));
+    for threads in [1, 3] {
+        let saved = picture(&everything(), Savings::LOSSLESS, threads).unwrap();
+        assert_eq!(saved.pixels, reference.pixels);
+        assert!(saved.account.done.evaluations * 2 < reference.account.done.evaluations);
+    }
+    for name in ["materials", "channels", "directions", "repeated"] {
+        let savings = Savings::LOSSLESS.without(name).unwrap();
+        let without = picture(&everything(), savings, 2).unwrap();
+        assert_eq!(without.pixels, reference.pixels, "{name}");
+    }
+}
+
+#[test]
+fn all_savings_stay_within_half_a_display_step_on_average_and_two_at_most() {
+    for name in ["materials", "contact-sheet", "comparison"] {
+        let mut sheet = builtin(name, None).unwrap();
+        sheet.resize(400, 225);
+        let render = |savings| {
+            let options = Options {
+                savings,
+                threads: 0,
+            };
+            Bitmap::display(&sheet.render(&library(), options, &|_, _| {}).unwrap())
+        };
+        steps_apart(&render(Savings::NONE), &render(Savings::ALL), name);
+    }
+    let render = |savings| Bitmap::display(&picture(&everything(), savings, 0).unwrap());
+    steps_apart(&render(Savings::NONE), &render(Savings::ALL), "everything");
+}
+
+fn steps_apart(a: &Bitmap, b: &Bitmap, name: &str) {
+    let steps: Vec<u8> = a
+        .bytes()
+        .iter()
+        .zip(b.bytes())
+        .map(|(a, b)| a.abs_diff(*b))
+        .collect();
+    let mean = steps.iter().map(|&s| f64::from(s)).sum::<f64>() / steps.len() as f64;
+    let most = steps.iter().max().unwrap();
+    assert!(
+        mean <= 0.5 && *most <= 2,
+        "{name}: mean {mean}, most {most}"
+    );
+}
+
+#[test]
+fn of_61_materials_only_the_3_that_are_seen_are_made() {
+    let mut text = head(48, 16, "samples = 4") + "[[directional]]\ntowards = [0, 0, 1]\n";
+    for id in 1..=61 {
+        text += &format!("[material.m{id}]\ncuret = '{id}'\n");
+    }
+    for (id, x) in [(5, -2.0), (20, 0.0), (33, 2.0)] {
+        text += &format!("[[sphere]]\ncentre = [{x}, 0, 0]\nradius = 0.9\nmaterial = 'm{id}'\n");
+    }
+    // Hidden behind the sphere in the middle.
+    text += "[[sphere]]\ncentre = [0, 0, -3]\nradius = 0.5\nmaterial = 'm40'\n";
+    let account = picture(&text, Savings::ALL, 2).unwrap().account;
+    let used: Vec<&str> = account.materials_used.keys().map(String::as_str).collect();
+    assert_eq!(
+        (account.materials_defined, used),
+        (61, vec!["m20", "m33", "m5"])
+    );
+}
+
+#[test]
+fn a_light_inside_a_sphere_lights_nothing_outside() {
+    let text = head(9, 9, "samples = 4")
+        + "[material.m]\nanalytic = 'lambert'\n[[point]]\nposition = [0, 0, 0]\n[[area]]\n\
+           corner = [-0.1, -0.1, 0.1]\nedge_u = [0.2, 0, 0]\nedge_v = [0, 0.2, 0]\n"
+        + SPHERE;
+    let picture = picture(&text, Savings::ALL, 1).unwrap();
+    assert!(picture.pixels.iter().flatten().all(|&v| v == 0.0));
+}
+
+#[test]
+fn impossible_scenes_are_errors_of_one_line_that_name_the_place() {
+    let material = "[material.m]\nanalytic = 'lambert'\n";
+    let with = |image: &str, rest: &str| head(4, 4, image) + material + rest;
+    let table = [
+        ("".to_owned(), "missing field `image`"),
+        (
+            "[image]\nwidth = 4\n[image".to_owned(),
+            "scene.toml, line 3: ",
+        ),
+        (
+            with("", "[[sphere]]\ncentre = [0, 0]\n"),
+            "scene.toml, line 11: ",
+        ),
+        (with("samplez = 3", ""), "line 4: unknown field `samplez`"),
+        (
+            with("", &SPHERE.replace("'m'", "'felt'")),
+            "line 14: unknown material 'felt'",
+        ),
+        (
+            with("", &SPHERE.replace("radius = 1", "radius = nan")),
+            "radius is NaN",
+        ),
+        (
+            with("", &SPHERE.replace("radius = 1", "radius = -1")),
+            "radius is -1",
+        ),
+        (
+            with("", &SPHERE.replace("[0, 0, 0]", "[inf, 0, 0]")),
+            "centre is [inf, 0.0, 0.0]",
+        ),
+        (
+            with(
+                "",
+                "[[point]]\nposition = [0, 0, 0]\nintensity = [-1, 0, 0]",
+            ),
+            "intensity is [-1.0",
+        ),
+        (
+            with("", "[[directional]]\ntowards = [0, 0, 0]"),
+            "towards is [0.0, 0.0, 0.0]",
+        ),
+        (
+            with("", "[[mesh]]\nfile = 'no.obj'\nmaterial = 'm'"),
+            "cannot read no.obj",
+        ),
+        (
+            with("", "[environment]\nfile = 'no.exr'"),
+            "cannot read no.exr",
+        ),
+        (with("samples = 0", ""), "image.samples is 0"),
+        (with("samples = 100000", ""), "100000 samples per pixel"),
+        (with("exposure = nan", ""), "image.exposure is NaN"),
+        (head(0, 4, ""), "the image size is 0 x 4"),
+        (
+            head(4_000_000_000, 4_000_000_000, ""),
+            "16000000000000000000 pixels",
+        ),
+        (
+            with("", SPHERE).replace("analytic = 'lambert'", "curet = '62'"),
+            "material 'm': ",
+        ),
+        (
+            with("", SPHERE).replace("analytic = 'lambert'", "curet = '1'\ncsv = 'a.csv'"),
+            "expected exactly one of",
+        ),
+        (
+            with("", SPHERE).replace("'lambert'", "'phong'"),
+            "unknown formula 'phong'",
+        ),
+        (
+            with("", SPHERE).replace("'lambert'", "'ggx'\nroughness = 0"),
+            "roughness is 0",
+        ),
+        (
+            with("", &"[[point]]\nposition = [0, 0, 0]\n".repeat(70_000)),
+            "70000 lights",
+        ),
+    ];
+    for (text, part) in table {
+        let error = picture(&text, Savings::ALL, 1).unwrap_err().to_string();
+        assert!(error.contains(part), "expected '{part}' in '{error}'");
+        assert!(!error.contains('\n'), "{error}");
+    }
+}
+
+#[test]
+fn a_picture_that_cannot_be_written_leaves_no_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let picture = picture(&(head(4, 4, "") + "[environment]\n"), Savings::ALL, 1).unwrap();
+    for name in ["a.png", "a.exr"] {
+        let path = dir.path().join(name);
+        picture.write(&path).unwrap();
+        let read = image::open(&path).unwrap();
+        assert_eq!((read.width(), read.height()), (4, 4));
+        assert!((read.into_rgb32f().get_pixel(1, 1)[0] - 1.0).abs() < 1e-6);
+    }
+    assert!(picture.write(&dir.path().join("no/where.png")).is_err());
+    assert!(picture.write(&dir.path().join("a.jpeg")).is_err());
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
+}
+
+/// Models fitted to stand-in materials of every family.
+fn fitted() -> Vec<Material> {
+    [5, 6, 7, 8, 61]
+        .map(|id| {
+            let asked = scene::Material {
+                curet: Some(format!("{id}")),
+                ..scene::Material::default()
+            };
+            let supplied = library().supply(&asked, Path::new("")).unwrap();
+            Material::new(supplied.brdf, [1.0; 3], false).unwrap()
+        })
+        .into()
+}
+
+/// Viewing angles from the normal to next to grazing.
+const VIEWS: [f64; 4] = [0.0, 0.5, 1.2, 1.55];
+
+#[test]
+fn drawn_directions_follow_their_density_by_the_chi_square_test() {
+    const THETAS: usize = 6;
+    const PHIS: usize = 8;
+    const DRAWS: usize = 40_000;
+    // Steps of the density within a bin; the density is constant on each.
+    const FINE: usize = 4;
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    for material in fitted() {
+        for view in VIEWS {
+            let outgoing = cartesian(view, 0.3);
+            let mut counts = [0.0; THETAS * PHIS];
+            for _ in 0..DRAWS {
+                let (w, density) = material.sample(outgoing, [random.random(), random.random()]);
+                assert!((material.pdf(outgoing, w) / density - 1.0).abs() < 1e-6);
+                let theta = w[2].acos() / FRAC_PI_2 * THETAS as f64;
+                let phi = (w[1].atan2(w[0]) - 0.3).rem_euclid(TAU) / TAU * PHIS as f64;
+                counts[(theta as usize).min(THETAS - 1) * PHIS + (phi as usize).min(PHIS - 1)] +=
+                    1.0;
+            }
+            let mut statistic = 0.0;
+            let mut total = 0.0;
+            for (bin, count) in counts.iter().enumerate() {
+                let mut expected = 0.0;
+                for t in 0..FINE {
+                    let theta = |t: usize| {
+                        (bin / PHIS * FINE + t) as f64 / (THETAS * FINE) as f64 * FRAC_PI_2
+                    };
+                    let (near, far) = (theta(t).cos(), theta(t + 1).cos());
+                    for p in 0..FINE {
+                        let phi =
+                            ((bin % PHIS * FINE + p) as f64 + 0.5) / (PHIS * FINE) as f64 * TAU;
+                        let incident = cartesian(((near + far) / 2.0).acos(), phi + 0.3);
+                        let area = (near - far) * TAU / (PHIS * FINE) as f64;
+                        expected += material.pdf(outgoing, incident) * area;
+                    }
+                }
+                total += expected;
+                let expected = expected * DRAWS as f64;
+                statistic += (count - expected) * (count - expected) / expected;
+            }
+            assert!(
+                (total - 1.0).abs() < 1e-9,
+                "the density integrates to {total}"
+            );
+            // Wilson and Hilferty's approximation: the cube root of chi-square over its degrees of
+            // freedom is normal. Five deviations are passed once in three million.
+            let freedom = (THETAS * PHIS - 1) as f64;
+            let spread = 2.0 / (9.0 * freedom);
+            let limit = freedom * (1.0 - spread + 5.0 * spread.sqrt()).powi(3);
+            assert!(statistic < limit, "{statistic} passes {limit} at {view}");
+        }
+    }
+}
+
+#[test]
+fn the_albedo_is_the_same_by_quadrature_by_sampling_and_in_the_table() {
+    let mut random = ChaCha8Rng::seed_from_u64(2);
+    for material in fitted() {
+        for (theta_o, tabulated) in material.albedo() {
+            let outgoing = cartesian(theta_o, 0.0);
+            let value = |incident: [f64; 3]| {
+                let f = material.eval(&[Pair { incident, outgoing }]).unwrap()[0];
+                (0.2126 * f[0] + 0.7152 * f[1] + 0.0722 * f[2]) * incident[2]
+            };
+            // Midpoints in the squared sine, where the cosine drops out.
+            let mut quadrature = 0.0;
+            for i in 0..48 {
+                let theta = ((f64::from(i) + 0.5) / 48.0).sqrt().asin();
+                for j in 0..32 {
+                    let incident = cartesian(theta, (f64::from(j) + 0.5) / 32.0 * PI);
+                    quadrature += PI * value(incident) / incident[2] / (48.0 * 32.0);
+                }
+            }
+            let draws = 2000;
+            let (mut sum, mut squares) = (0.0, 0.0);
+            for _ in 0..draws {
+                let (w, density) = material.sample(outgoing, [random.random(), random.random()]);
+                let weight = value(w) / density;
+                sum += weight;
+                squares += weight * weight;
+            }
+            let mean = sum / f64::from(draws);
+            let deviation = ((squares / f64::from(draws) - mean * mean) / f64::from(draws)).sqrt();
+            // Five deviations, and one part in a hundred for the quadrature.
+            let tolerance = 5.0 * deviation + 0.01 * quadrature;
+            assert!(
+                (mean - quadrature).abs() < tolerance,
+                "{theta_o}: {mean} {quadrature}"
+            );
+            // The table has 24 x 16 cells.
+            let tolerance = 0.03 * quadrature;
+            assert!(
+                (tabulated - quadrature).abs() < tolerance,
+                "{tabulated} {quadrature}"
+            );
+        }
+    }
+}
+
+#[test]
+fn in_a_furnace_a_learnt_sphere_shows_its_albedo() {
+    let text =
+        head(16, 16, "samples = 256") + "[material.m]\ncuret = '7'\n[environment]\n" + SPHERE;
+    let picture = picture(&text, Savings::LOSSLESS, 2).unwrap();
+    let material = &fitted()[2];
+    // The pixel beside the middle sees the sphere at 1/16 to 2/16 of its radius on both axes.
+    let near_normal = material.albedo()[1].1;
+    let pixel = picture.pixels[8 * 16 + 8];
+    let found = 0.2126 * pixel[0] + 0.7152 * pixel[1] + 0.0722 * pixel[2];
+    assert!(
+        (found / near_normal - 1.0).abs() < 0.03,
+        "{found} {near_normal}"
+    );
+}
