@@ -8,7 +8,9 @@ use crate::error::{Error, Result};
 use crate::hidden::{Biases, Distribution, HiddenLayer, Plan};
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
-use crate::solve::{Diagnosis, LeastSquares, Solution, Solver, check_length, check_matrix};
+use crate::solve::{
+    Diagnosis, LeastSquares, Solution, Solver, check_length, check_matrix, check_room,
+};
 use crate::validate::{HeldOut, Validator};
 
 /// Settings of an extreme learning machine. Setters never fail; [`check`](Self::check) and
@@ -257,22 +259,11 @@ impl<A: Scalar> CheckedParams<A> {
             hidden,
             design,
         } = self.draw(x.view(), t)?;
-        let Solution {
-            beta,
-            intercept,
-            diagnosis,
-        } = self
+        let solution = self
             .0
             .solver
             .solve(&self.problem(&design, t, weights.as_ref())?)?;
-        Ok(Elm {
-            scaler,
-            hidden,
-            direct_links: self.0.direct_links,
-            beta,
-            intercept,
-            diagnosis,
-        })
+        Ok(Elm::assemble(scaler, hidden, self.0.direct_links, solution))
     }
 
     /// Held-out predictions for every row, from one random layer and one factorisation: `folds`
@@ -333,19 +324,11 @@ impl<A: Scalar> CheckedParams<A> {
         check_length("rows of targets", t.nrows(), x.nrows())?;
 
         // Asked before anything is drawn, as a failed allocation would abort the program.
-        check_room(
-            "the hidden layer",
-            x.ncols().saturating_add(1),
-            params.neurons,
-        )?;
         check_room("the hidden-layer matrix", x.nrows(), params.neurons)?;
-        if !params.input_scales.is_empty() {
-            check_length("input scales", params.input_scales.len(), x.ncols())?;
-        }
         let scaler = params.standardise.then(|| Scaler::measure(x));
         let scaled = scaler.as_ref().map(|scaler| scaler.transform(x));
         let x = scaled.as_ref().map_or(x, |scaled| scaled.view());
-        let hidden = HiddenLayer::draw(x, &params.plan());
+        let hidden = self.layer(x)?;
         let design = design(&hidden, params.direct_links, x);
         Ok(Drawn {
             scaler,
@@ -360,14 +343,42 @@ impl<A: Scalar> CheckedParams<A> {
         t: ArrayView2<'a, A>,
         weights: Option<&'a ArrayView1<'_, A>>,
     ) -> Result<LeastSquares<'a, A>> {
-        // Equation 10 has no room for a constant; asking for both explicitly is an error.
-        let inverse = matches!(self.0.solver, Solver::Inverse(_));
-        let problem = LeastSquares::of_views(design.view(), t)?
-            .intercept(self.0.intercept.unwrap_or(!inverse));
+        let problem = LeastSquares::of_views(design.view(), t)?.intercept(self.has_intercept());
         match weights {
             Some(weights) => problem.weights(weights),
             None => Ok(problem),
         }
+    }
+
+    /// The random layer for these (standardised) rows, of which only
+    /// [`Biases::OnData`] uses more than the number of inputs.
+    pub(crate) fn layer(&self, x: ArrayView2<'_, A>) -> Result<HiddenLayer<A>> {
+        let params = &self.0;
+        // A failed allocation would abort the program.
+        let per_neuron = x.ncols().saturating_add(1);
+        check_room("the hidden layer", per_neuron, params.neurons)?;
+        if !params.input_scales.is_empty() {
+            check_length("input scales", params.input_scales.len(), x.ncols())?;
+        }
+        Ok(HiddenLayer::draw(x, &params.plan()))
+    }
+
+    pub(crate) fn biases(&self) -> Biases {
+        self.0.biases
+    }
+
+    /// Equation 10 has no room for a constant; asking for both explicitly is an error later.
+    pub(crate) fn has_intercept(&self) -> bool {
+        let inverse = matches!(self.0.solver, Solver::Inverse(_));
+        self.0.intercept.unwrap_or(!inverse)
+    }
+
+    pub(crate) fn standardises(&self) -> bool {
+        self.0.standardise
+    }
+
+    pub(crate) fn links_directly(&self) -> bool {
+        self.0.direct_links
     }
 
     pub(crate) fn solver(&self) -> Solver {
@@ -388,23 +399,8 @@ struct Drawn<A: Scalar> {
     design: Array2<A>,
 }
 
-/// Whether an array of this size can be allocated at all.
-fn check_room(what: &'static str, rows: usize, columns: usize) -> Result<()> {
-    let too_large = Error::TooLarge {
-        what,
-        rows,
-        columns,
-    };
-    let Some(entries) = rows.checked_mul(columns) else {
-        return Err(too_large);
-    };
-    // Layers are drawn in f64 whatever they are kept in.
-    let room = Vec::<f64>::new().try_reserve_exact(entries);
-    room.map_err(|_| too_large)
-}
-
 /// Project, activate, and append the inputs where they are linked directly.
-fn design<A: Scalar>(
+pub(crate) fn design<A: Scalar>(
     hidden: &HiddenLayer<A>,
     direct_links: bool,
     x: ArrayView2<'_, A>,
@@ -484,6 +480,27 @@ impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
 }
 
 impl<A: Scalar> Elm<A> {
+    pub(crate) fn assemble(
+        scaler: Option<Scaler<A>>,
+        hidden: HiddenLayer<A>,
+        direct_links: bool,
+        solution: Solution<A>,
+    ) -> Self {
+        let Solution {
+            beta,
+            intercept,
+            diagnosis,
+        } = solution;
+        Self {
+            scaler,
+            hidden,
+            direct_links,
+            beta,
+            intercept,
+            diagnosis,
+        }
+    }
+
     /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs).
     ///
     /// # Errors
