@@ -1,1 +1,4 @@
-//! Benchmarks of `elm` and `elm-brdf`: see `benches/` for the criterion benches.
+//! Benchmarks of `elm` and `elm-brdf`: see `benches/` for the criterion benches, `src/bin/` for
+//! the programs that write the tables of `docs/`.
+
+pub mod stress;
