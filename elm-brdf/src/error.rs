@@ -17,6 +17,10 @@ pub enum Error {
     /// The network could not be fitted or evaluated.
     #[error(transparent)]
     Elm(#[from] elm::Error),
+    /// Files could not be fetched.
+    #[cfg(feature = "fetch")]
+    #[error(transparent)]
+    Fetch(#[from] crate::fetch::Error),
     /// So many folds are impossible.
     #[error("{folds} folds of {rows} measurements: expected 2 to {rows} folds")]
     Folds {

@@ -34,6 +34,8 @@ pub mod brdf;
 pub mod cli;
 mod error;
 pub mod features;
+#[cfg(feature = "fetch")]
+pub mod fetch;
 pub mod geometry;
 pub mod link;
 pub mod model;

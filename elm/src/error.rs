@@ -83,6 +83,12 @@ pub enum Error {
         /// The fold's label; for leave-one-out the row, counted from 0.
         fold: usize,
     },
+    /// Two accumulators that are to be merged are not of one kind.
+    #[error("the accumulators have different {what}")]
+    Mismatch {
+        /// What differs.
+        what: &'static str,
+    },
     /// A factorisation did not converge.
     #[error("{what} did not converge")]
     NoConvergence {

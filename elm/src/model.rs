@@ -8,7 +8,9 @@ use crate::error::{Error, Result};
 use crate::hidden::{Biases, Distribution, HiddenLayer, Plan};
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
-use crate::solve::{Diagnosis, LeastSquares, Solution, Solver, check_length, check_matrix};
+use crate::solve::{
+    Diagnosis, LeastSquares, Solution, Solver, check_length, check_matrix, check_room,
+};
 use crate::validate::{HeldOut, Validator};
 
 /// Settings of an extreme learning machine. Setters never fail; [`check`](Self::check) and
@@ -76,6 +78,21 @@ impl<A: Scalar> ElmParams<A> {
             standardise: true,
             direct_links: false,
         }
+    }
+
+    /// Another number of hidden neurons.
+    #[must_use]
+    pub fn with_neurons(mut self, neurons: usize) -> Self {
+        self.neurons = neurons;
+        self
+    }
+
+    pub(crate) fn neurons(&self) -> usize {
+        self.neurons
+    }
+
+    pub(crate) fn get_seed(&self) -> u64 {
+        self.seed
     }
 
     /// The activation function of the hidden neurons.
@@ -242,22 +259,11 @@ impl<A: Scalar> CheckedParams<A> {
             hidden,
             design,
         } = self.draw(x.view(), t)?;
-        let Solution {
-            beta,
-            intercept,
-            diagnosis,
-        } = self
+        let solution = self
             .0
             .solver
             .solve(&self.problem(&design, t, weights.as_ref())?)?;
-        Ok(Elm {
-            scaler,
-            hidden,
-            direct_links: self.0.direct_links,
-            beta,
-            intercept,
-            diagnosis,
-        })
+        Ok(Elm::assemble(scaler, hidden, self.0.direct_links, solution))
     }
 
     /// Held-out predictions for every row, from one random layer and one factorisation: `folds`
@@ -292,13 +298,22 @@ impl<A: Scalar> CheckedParams<A> {
             Solver::PseudoInverse(_) => None,
             Solver::Ridge(ridge) => Some(ridge),
         };
-        let design = self.draw(x.view(), t)?.design;
-        let validator = Validator::new(&self.problem(&design, t, None)?)?;
+        let validator = self.validator(x.view(), t)?;
         let lambda = match ridge {
             Some(ridge) => validator.strengths(ridge)?,
             None => vec![0.0],
         };
         validator.k_fold(folds, &lambda)
+    }
+
+    /// Draws the layer, applies it, and factorises.
+    pub(crate) fn validator(
+        &self,
+        x: ArrayView2<'_, A>,
+        t: ArrayView2<'_, A>,
+    ) -> Result<Validator<A>> {
+        let design = self.draw(x, t)?.design;
+        Validator::new(&self.problem(&design, t, None)?)
     }
 
     /// Checks the data, draws the layer and applies it.
@@ -309,19 +324,11 @@ impl<A: Scalar> CheckedParams<A> {
         check_length("rows of targets", t.nrows(), x.nrows())?;
 
         // Asked before anything is drawn, as a failed allocation would abort the program.
-        check_room(
-            "the hidden layer",
-            x.ncols().saturating_add(1),
-            params.neurons,
-        )?;
         check_room("the hidden-layer matrix", x.nrows(), params.neurons)?;
-        if !params.input_scales.is_empty() {
-            check_length("input scales", params.input_scales.len(), x.ncols())?;
-        }
         let scaler = params.standardise.then(|| Scaler::measure(x));
         let scaled = scaler.as_ref().map(|scaler| scaler.transform(x));
         let x = scaled.as_ref().map_or(x, |scaled| scaled.view());
-        let hidden = HiddenLayer::draw(x, &params.plan());
+        let hidden = self.layer(x)?;
         let design = design(&hidden, params.direct_links, x);
         Ok(Drawn {
             scaler,
@@ -330,20 +337,52 @@ impl<A: Scalar> CheckedParams<A> {
         })
     }
 
-    fn problem<'a>(
+    pub(crate) fn problem<'a>(
         &self,
         design: &'a Array2<A>,
         t: ArrayView2<'a, A>,
         weights: Option<&'a ArrayView1<'_, A>>,
     ) -> Result<LeastSquares<'a, A>> {
-        // Equation 10 has no room for a constant; asking for both explicitly is an error.
-        let inverse = matches!(self.0.solver, Solver::Inverse(_));
-        let problem = LeastSquares::of_views(design.view(), t)?
-            .intercept(self.0.intercept.unwrap_or(!inverse));
+        let problem = LeastSquares::of_views(design.view(), t)?.intercept(self.has_intercept());
         match weights {
             Some(weights) => problem.weights(weights),
             None => Ok(problem),
         }
+    }
+
+    /// The random layer for these (standardised) rows, of which only
+    /// [`Biases::OnData`] uses more than the number of inputs.
+    pub(crate) fn layer(&self, x: ArrayView2<'_, A>) -> Result<HiddenLayer<A>> {
+        let params = &self.0;
+        // A failed allocation would abort the program.
+        let per_neuron = x.ncols().saturating_add(1);
+        check_room("the hidden layer", per_neuron, params.neurons)?;
+        if !params.input_scales.is_empty() {
+            check_length("input scales", params.input_scales.len(), x.ncols())?;
+        }
+        Ok(HiddenLayer::draw(x, &params.plan()))
+    }
+
+    pub(crate) fn biases(&self) -> Biases {
+        self.0.biases
+    }
+
+    /// Equation 10 has no room for a constant; asking for both explicitly is an error later.
+    pub(crate) fn has_intercept(&self) -> bool {
+        let inverse = matches!(self.0.solver, Solver::Inverse(_));
+        self.0.intercept.unwrap_or(!inverse)
+    }
+
+    pub(crate) fn standardises(&self) -> bool {
+        self.0.standardise
+    }
+
+    pub(crate) fn links_directly(&self) -> bool {
+        self.0.direct_links
+    }
+
+    pub(crate) fn solver(&self) -> Solver {
+        self.0.solver
     }
 
     /// The settings.
@@ -360,23 +399,8 @@ struct Drawn<A: Scalar> {
     design: Array2<A>,
 }
 
-/// Whether an array of this size can be allocated at all.
-fn check_room(what: &'static str, rows: usize, columns: usize) -> Result<()> {
-    let too_large = Error::TooLarge {
-        what,
-        rows,
-        columns,
-    };
-    let Some(entries) = rows.checked_mul(columns) else {
-        return Err(too_large);
-    };
-    // Layers are drawn in f64 whatever they are kept in.
-    let room = Vec::<f64>::new().try_reserve_exact(entries);
-    room.map_err(|_| too_large)
-}
-
 /// Project, activate, and append the inputs where they are linked directly.
-fn design<A: Scalar>(
+pub(crate) fn design<A: Scalar>(
     hidden: &HiddenLayer<A>,
     direct_links: bool,
     x: ArrayView2<'_, A>,
@@ -394,7 +418,7 @@ fn design<A: Scalar>(
 /// A fitted network: $o(x) = \sum_k \beta_k f(\omega_k \cdot x + b_k)$ (equation 7) plus, where
 /// set, an intercept and direct links. Made by [`ElmParams::fit`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[serde(bound = "", try_from = "Parts<A>")]
 pub struct Elm<A: Scalar> {
     scaler: Option<Scaler<A>>,
     hidden: HiddenLayer<A>,
@@ -405,7 +429,86 @@ pub struct Elm<A: Scalar> {
     diagnosis: Diagnosis,
 }
 
+/// An [`Elm`] as it comes from outside, before its parts are known to fit together.
+#[derive(Deserialize)]
+#[serde(bound = "")]
+struct Parts<A: Scalar> {
+    scaler: Option<Scaler<A>>,
+    hidden: HiddenLayer<A>,
+    direct_links: bool,
+    beta: Array2<A>,
+    intercept: Array1<A>,
+    diagnosis: Diagnosis,
+}
+
+/// Whether a layer and a scaler from outside are finite and fit each other.
+pub(crate) fn check_layer<A: Scalar>(
+    hidden: &HiddenLayer<A>,
+    scaler: Option<&Scaler<A>>,
+) -> Result<()> {
+    let (inputs, neurons) = hidden.weights().dim();
+    check_matrix("hidden weights", hidden.weights())?;
+    check_length("hidden biases", hidden.biases().len(), neurons)?;
+    check_matrix("hidden biases", hidden.biases().insert_axis(Axis(0)))?;
+    for vector in scaler.iter().flat_map(|s| [s.mean(), s.factor()]) {
+        check_length("inputs of the scaler", vector.len(), inputs)?;
+        check_matrix("the scaler", vector.insert_axis(Axis(0)))?;
+    }
+    Ok(())
+}
+
+impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
+    type Error = Error;
+
+    fn try_from(parts: Parts<A>) -> Result<Self> {
+        let Parts {
+            scaler,
+            hidden,
+            direct_links,
+            beta,
+            intercept,
+            diagnosis,
+        } = parts;
+        check_layer(&hidden, scaler.as_ref())?;
+        let (inputs, neurons) = hidden.weights().dim();
+        check_matrix("output weights", beta.view())?;
+        let columns = neurons + if direct_links { inputs } else { 0 };
+        check_length("rows of output weights", beta.nrows(), columns)?;
+        check_length("intercepts", intercept.len(), beta.ncols())?;
+        check_matrix("intercepts", intercept.view().insert_axis(Axis(0)))?;
+        Ok(Self {
+            scaler,
+            hidden,
+            direct_links,
+            beta,
+            intercept,
+            diagnosis,
+        })
+    }
+}
+
 impl<A: Scalar> Elm<A> {
+    pub(crate) fn assemble(
+        scaler: Option<Scaler<A>>,
+        hidden: HiddenLayer<A>,
+        direct_links: bool,
+        solution: Solution<A>,
+    ) -> Self {
+        let Solution {
+            beta,
+            intercept,
+            diagnosis,
+        } = solution;
+        Self {
+            scaler,
+            hidden,
+            direct_links,
+            beta,
+            intercept,
+            diagnosis,
+        }
+    }
+
     /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs).
     ///
     /// # Errors
@@ -433,6 +536,23 @@ impl<A: Scalar> Elm<A> {
                 what: "a prediction",
             })
         }
+    }
+
+    /// The hidden-layer matrix of these inputs (the paper's $F$, equation 9): shape (rows, inputs)
+    /// to (rows, neurons), followed by the standardised inputs where they are linked directly.
+    /// Times [`beta`](Self::beta) plus [`intercept`](Self::intercept) it is the prediction.
+    ///
+    /// # Errors
+    /// [`Error::Shape`], [`Error::Empty`] and [`Error::NotFinite`] for `x`.
+    pub fn hidden_matrix(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
+        check_length("inputs", x.ncols(), self.inputs())?;
+        check_matrix("inputs", x.view())?;
+        let scaled = self
+            .scaler
+            .as_ref()
+            .map(|scaler| scaler.transform(x.view()));
+        let x = scaled.as_ref().map_or(x.view(), |scaled| scaled.view());
+        Ok(design(&self.hidden, self.direct_links, x))
     }
 
     /// Number of inputs.

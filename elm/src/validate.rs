@@ -39,14 +39,14 @@
 
 mod fold;
 
-use ndarray::{Array1, Array2, ArrayView2, Axis, Zip};
+use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis, Zip};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
-use crate::solve::spectrum::{RowSpectrum, rounding};
+use crate::solve::spectrum::{RowSpectrum, Spectrum, rounding};
 use crate::solve::{LeastSquares, Ridge, check_length};
 use fold::Fold;
 
@@ -117,6 +117,70 @@ impl<A: Scalar> Validator<A> {
     pub fn strengths(&self, ridge: Ridge) -> Result<Vec<f64>> {
         ridge.check()?;
         Ok(ridge.strengths(&self.rows))
+    }
+
+    /// Coordinates of new hidden rows: centred, scaled, along the right singular vectors (shape
+    /// (rows, $k$)), and the squared length that lies outside them.
+    fn coordinates(&self, hidden: &ArrayRef2<A>) -> (Array2<A>, Array1<A>) {
+        let Spectrum { frame, vt, .. } = &self.rows.spectrum;
+        // Scaled before centring, as the difference of two huge values may overflow.
+        let scaled = hidden / frame.hidden_scale;
+        let centred = scaled - frame.hidden_mean.mapv(|m| m / frame.hidden_scale);
+        let inside = A::product(centred.view(), vt.t());
+        let length = |row: ArrayView1<'_, A>| row.dot(&row);
+        let outside = Zip::from(centred.rows())
+            .and(inside.rows())
+            .map_collect(|all, inside| (length(all) - length(inside)).max(A::zero()));
+        (inside, outside)
+    }
+
+    /// What an intercept adds to each of the forms below: $1 / n$, or 0 without one.
+    fn constant_share(&self) -> A {
+        let frame = &self.rows.spectrum.frame;
+        if frame.intercept {
+            A::one() / frame.total_weight
+        } else {
+            A::zero()
+        }
+    }
+
+    /// $1/n + \tilde h^T (\tilde H^T \tilde H + \lambda)^{-1} \tilde h$ for each new hidden row and each
+    /// output's relative strength, shape (rows, outputs).
+    pub(crate) fn posterior_spread(&self, hidden: &ArrayRef2<A>, lambda: &[f64]) -> Array2<A> {
+        let (inside, outside) = self.coordinates(hidden);
+        let s = &self.rows.spectrum.s;
+        let largest = s.first().copied().unwrap_or(A::zero());
+        let mut spread = Array2::zeros((hidden.nrows(), lambda.len()));
+        for (mut column, &lambda) in spread.columns_mut().into_iter().zip(lambda) {
+            let absolute = A::from_f64(lambda) * largest * largest;
+            Zip::from(&mut column)
+                .and(inside.rows())
+                .and(&outside)
+                .for_each(|spread, row, &rest| {
+                    let within: A = row
+                        .iter()
+                        .zip(s)
+                        .map(|(&p, &s)| p * p / (s * s + absolute))
+                        .sum();
+                    let beyond = if rest > A::zero() {
+                        rest / absolute
+                    } else {
+                        A::zero()
+                    };
+                    *spread = self.constant_share() + within + beyond;
+                });
+        }
+        spread
+    }
+
+    /// $1/n + \tilde h^T (\tilde H^T \tilde H + \lambda)^{-1} \tilde h_i$ for one new hidden row and every
+    /// training row $i$: leaving out row $i$ lowers the prediction by its leave-one-out residual
+    /// times this.
+    pub(crate) fn pull(&self, hidden: &ArrayRef2<A>, lambda: f64) -> Array1<A> {
+        let (inside, _) = self.coordinates(hidden);
+        let gain = self.rows.spectrum.ridge_gain(&[A::from_f64(lambda)]);
+        let along = &inside.row(0) * &gain.column(0);
+        self.rows.u.dot(&along) + self.constant_share()
     }
 
     /// What is predicted for each row by the fit to all others.

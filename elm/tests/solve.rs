@@ -9,8 +9,10 @@
 
 mod common;
 
-use common::{Problem, deficient, frobenius, integers, largest, normal, problems, weights};
-use elm::solve::{Inverse, LeastSquares, PseudoInverse, Ridge, Solver};
+use common::{
+    Problem, amplification, deficient, frobenius, integers, largest, normal, problems, weights,
+};
+use elm::solve::{Inverse, LeastSquares, PseudoInverse, Reason, Ridge, Route, Solver};
 use elm::{ElmParams, Scalar};
 use ndarray::{Array2, Axis, concatenate};
 use proptest::prelude::*;
@@ -28,7 +30,7 @@ fn assert_close<A: Scalar>(a: &Array2<A>, b: &Array2<A>, bound: f64, what: &str)
 fn equations_10_and_11_agree<A: Scalar>(n: usize, seed: u64) {
     let problem = Problem::new(normal::<A>(n, n, seed), normal(n, 2, seed + 1));
     let general = problem.solve(PseudoInverse::default());
-    let condition = general.diagnosis.condition;
+    let condition = general.diagnosis.condition.unwrap();
     // "Well-conditioned": half of the digits are left.
     if condition * A::epsilon().as_f64().sqrt() > 1.0 {
         return;
@@ -45,8 +47,8 @@ fn is_the_penrose_inverse<A: Scalar>(f: &Array2<A>) {
     let solution = problem.solve(PseudoInverse::default());
     let x = solution.beta;
     let (fx, xf) = (f.dot(&x), x.dot(f));
-    let unit = solution.diagnosis.condition * backward_error(f);
-    let rank = solution.diagnosis.rank as f64;
+    let unit = solution.diagnosis.condition.unwrap() * backward_error(f);
+    let rank = solution.diagnosis.rank.unwrap() as f64;
     assert_close(&fx.dot(f), f, unit * frobenius(f), "F X F = F");
     assert_close(&xf.dot(&x), &x, unit * frobenius(&x), "X F X = X");
     assert_close(&fx.t().to_owned(), &fx, unit * rank.sqrt(), "F X symmetric");
@@ -139,8 +141,8 @@ proptest! {
         let f = concatenate(Axis(1), &[a.view(), a.dot(&m).view()]).unwrap();
         let problem = Problem::new(f, normal(rows, 2, seed + 2));
         let solution = problem.solve(PseudoInverse::default());
-        prop_assume!(solution.diagnosis.condition < 1e8);
-        let unit = solution.diagnosis.condition * backward_error(&problem.hidden);
+        prop_assume!(solution.diagnosis.condition.unwrap() < 1e8);
+        let unit = solution.diagnosis.condition.unwrap() * backward_error(&problem.hidden);
         let size = frobenius(&solution.beta);
         let (top, bottom) = solution.beta.view().split_at(Axis(0), rows);
         assert_close(&m.t().dot(&top), &bottom.to_owned(), unit * size * (1.0 + frobenius(&m)), "orthogonal");
@@ -221,7 +223,8 @@ proptest! {
             let d = &one.diagnosis;
             let size = f64::abs(constant) + frobenius(&problem.targets);
             let rounding = backward_error(&problem.hidden) * size;
-            let bound = rounding * d.condition / d.smallest_singular_value.max(1e-300);
+            let smallest = d.smallest_singular_value.unwrap_or(d.largest_singular_value * 1e-2);
+            let bound = rounding * amplification(d) / smallest;
             assert_close(&one.beta, &other.beta, bound, "beta");
             let shift = other.intercept[0] - one.intercept[0];
             let bound = rounding + bound * frobenius(&problem.hidden);
@@ -249,11 +252,7 @@ fn same_answer(one: &Problem<f64>, other: &Problem<f64>) {
         let (a, b) = (one.solve(solver), other.solve(solver));
         let d = &a.diagnosis;
         // Shrunk directions pass on no more than 1 / sqrt(lambda).
-        let condition = if d.lambda[0] > 0.0 {
-            d.condition.min(1.0 / d.lambda[0].sqrt())
-        } else {
-            d.condition
-        };
+        let condition = d.condition.unwrap_or(1.0 / d.lambda[0].sqrt());
         if condition > 1e5 {
             continue;
         }
@@ -340,12 +339,18 @@ fn gcv_chooses_the_smallest_score_of_its_definition() {
         let chosen = problem.solve(Ridge::gcv()).diagnosis.lambda;
         for (output, &chosen) in chosen.iter().enumerate() {
             // n RSS / (n - df)^2 from a separate fit at each strength, with the relative error
-            // that the subtraction n - df brings: it is small where a wide matrix interpolates.
+            // that the subtraction n - df brings (it is small where a wide matrix interpolates) and
+            // that of the fast route.
             let score = |lambda: f64| {
                 let d = problem.solve(Ridge::relative(lambda)).diagnosis;
                 let spare = rows - d.degrees_of_freedom[output];
                 let score = rows * d.residual_norm[output].powi(2) / spare.powi(2);
-                (score, 8.0 * rows * f64::EPSILON / spare)
+                let fast = if d.condition.is_none() {
+                    1.0 / lambda
+                } else {
+                    0.0
+                };
+                (score, 8.0 * rows * f64::EPSILON * (1.0 + fast) / spare)
             };
             let (score_of_chosen, error) = score(chosen);
             for step in -40..=8 {
@@ -371,7 +376,66 @@ fn the_same_matrix_in_either_layout_gives_the_same_answer() {
             .solve(&LeastSquares::new(&view, &problem.targets).unwrap())
             .unwrap();
         let bound =
-            one.diagnosis.condition * backward_error(&problem.hidden) * frobenius(&one.beta);
+            amplification(&one.diagnosis) * backward_error(&problem.hidden) * frobenius(&one.beta);
         assert_close(&one.beta, &other.beta, bound, "beta");
+    }
+}
+
+/// Beta by the fast route against QR and singular values, which a strength just below the fast
+/// route's limit still takes: at nearly the same strength the two must nearly agree.
+#[test]
+fn the_fast_route_is_as_accurate_as_it_says() {
+    // Strengths on both sides of each limit, epsilon over accuracy.
+    let limit = f64::EPSILON / 1e-8;
+    for (name, problem) in problems::<f64>() {
+        if name == "only a constant" {
+            continue;
+        }
+        let fast = problem.solve(Ridge::relative(limit * (1.0 + 1e-13)));
+        let slow = problem.solve(Ridge::relative(limit * (1.0 - 1e-13)));
+        assert!(matches!(
+            fast.diagnosis.route,
+            Route::Gram | Route::DualGram
+        ));
+        assert_eq!(fast.diagnosis.reason, Reason::StrongRidge);
+        assert!(matches!(slow.diagnosis.route, Route::Svd | Route::QrSvd));
+        assert_eq!(slow.diagnosis.reason, Reason::WeakRidge);
+        let error = frobenius(&(&fast.beta - &slow.beta)) / frobenius(&slow.beta);
+        assert!(error < 1e-8, "{name}: {error:e}");
+        let (f, s) = (fast.diagnosis, slow.diagnosis);
+        approx::assert_relative_eq!(
+            f.largest_singular_value,
+            s.largest_singular_value,
+            max_relative = 1e-10
+        );
+        for output in 0..2 {
+            let difference = f.degrees_of_freedom[output] - s.degrees_of_freedom[output];
+            assert!(difference.abs() < 1e-6, "{name}: {difference:e}");
+            let difference = f.residual_norm[output] - s.residual_norm[output];
+            assert!(
+                difference.abs() < 1e-8 * frobenius(&problem.targets),
+                "{name}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_fast_route_in_single_precision_is_as_accurate_as_it_says() {
+    let limit = f64::from(f32::EPSILON) / 1e-3;
+    for (name, problem) in problems::<f32>() {
+        let double = Problem {
+            hidden: problem.hidden.mapv(f64::from),
+            targets: problem.targets.mapv(f64::from),
+            weights: problem.weights.as_ref().map(|w| w.mapv(f64::from)),
+            intercept: problem.intercept,
+        };
+        let lambda = limit * 1.01;
+        let (single, truth) = (
+            problem.solve(Ridge::relative(lambda)).beta.mapv(f64::from),
+            double.solve(Ridge::relative(lambda)).beta,
+        );
+        let error = frobenius(&(&single - &truth));
+        assert!(error <= 1e-3 * frobenius(&truth), "{name}: {error:e}");
     }
 }

@@ -83,7 +83,7 @@ fn repeating_the_first_input_as_the_third_is_a_wider_weight_and_nothing_else() {
         let t = ndarray::Array2::<f64>::zeros((x.nrows(), 1));
         let problem = elm::solve::LeastSquares::new(x, &t).unwrap();
         let solver = elm::solve::Solver::from(PseudoInverse::default());
-        solver.solve(&problem).unwrap().diagnosis.rank
+        solver.solve(&problem).unwrap().diagnosis.rank.unwrap()
     };
     assert_eq!((rank(&x), rank(&without)), (5, 5));
 }

@@ -34,8 +34,13 @@ pub(super) fn hint(source: &Source) {
     let cache = data::cache().map_or_else(String::new, |dir| {
         format!(", or put them in {}", dir.display())
     });
+    let fetch = if cfg!(feature = "fetch") {
+        ", or fetch them with 'elm-brdf fetch curet'"
+    } else {
+        ""
+    };
     say(&format!(
-        "note: no CUReT files; name their folder with --data or {}{cache}",
+        "note: no CUReT files; name their folder with --data or {}{cache}{fetch}",
         data::VARIABLE
     ));
 }

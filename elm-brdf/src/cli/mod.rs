@@ -4,6 +4,8 @@
 mod common;
 mod compare;
 mod data;
+#[cfg(feature = "fetch")]
+mod fetch;
 mod reproduce;
 
 use std::io::{self, Write};
@@ -26,6 +28,8 @@ struct Arguments {
 enum Command {
     Reproduce(reproduce::Arguments),
     Compare(compare::Arguments),
+    #[cfg(feature = "fetch")]
+    Fetch(fetch::Arguments),
 }
 
 /// Why a command ended without doing its work.
@@ -37,6 +41,10 @@ enum Failure {
     /// It made sense, and failed: exit code 1.
     #[error(transparent)]
     Failed(#[from] Error),
+    /// It made sense, and another argument would let it through: exit code 1.
+    #[cfg(feature = "fetch")]
+    #[error("{0}")]
+    Refused(String),
     /// Whoever reads the output stopped reading, as `head` does: success.
     #[error("broken pipe")]
     BrokenPipe,
@@ -55,6 +63,8 @@ pub fn run() -> ExitCode {
         Ok(Arguments { command }) => match command {
             Command::Reproduce(arguments) => reproduce::run(&arguments),
             Command::Compare(arguments) => compare::run(&arguments),
+            #[cfg(feature = "fetch")]
+            Command::Fetch(arguments) => fetch::run(&arguments),
         },
         Err(error) => explain(&error),
     };

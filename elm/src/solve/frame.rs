@@ -44,6 +44,25 @@ impl<A: Scalar> Frame<A> {
         beta
     }
 
+    /// The constant of each output that goes with these output weights.
+    pub(crate) fn constant(&self, beta: &Array2<A>) -> Array1<A> {
+        &self.target_mean - &self.hidden_mean.dot(beta)
+    }
+
+    /// A singular value in the problem's own units.
+    pub(crate) fn outer_singular_value(&self, s: A) -> f64 {
+        s.as_f64() * (self.hidden_scale.as_f64() * self.weight_scale.as_f64().sqrt())
+    }
+
+    /// Norms of (weighted) residuals in the problem's own units.
+    pub(crate) fn outer_residual_norms(&self, norms: impl Iterator<Item = f64>) -> Vec<f64> {
+        let root_weight = self.weight_scale.as_f64().sqrt();
+        norms
+            .zip(&self.target_scale)
+            .map(|(norm, scale)| norm * scale.as_f64() * root_weight)
+            .collect()
+    }
+
     /// Whether this many singular vectors, with the intercept, reach every weighted row. What is
     /// left of the targets is then rounding error, and leave-one-out would divide one rounding
     /// error by another.
@@ -172,7 +191,7 @@ fn centre<A: Scalar>(matrix: &mut Array2<A>, weights: &Array1<A>, total: A) -> A
 
 /// The power of two at or just below a magnitude (so that dividing by it rounds nothing), or 1
 /// for 0.
-fn power_of_two<A: Scalar>(magnitude: A) -> A {
+pub(crate) fn power_of_two<A: Scalar>(magnitude: A) -> A {
     if magnitude == A::zero() {
         return A::one();
     }

@@ -1,11 +1,11 @@
 //! Equation 10: $\beta = H^{-1} T$ for square $H$.
 
-use ndarray::{Array1, Array2};
+use ndarray::Array1;
 use serde::{Deserialize, Serialize};
 
 use super::frame::Prepared;
 use super::spectrum::{norm, rounding};
-use super::{Diagnosis, LeastSquares, Route, Solution};
+use super::{Diagnosis, LeastSquares, Reason, Route, Solution};
 use crate::error::{Error, Result};
 use crate::linalg::Failure;
 use crate::scalar::Scalar;
@@ -65,20 +65,17 @@ impl Inverse {
         let outputs = problem.outputs();
         let residual = targets - A::product(hidden.view(), scaled.view());
         let beta = frame.restore(scaled);
-        let unit = frame.hidden_scale.as_f64();
-        let norms = |matrix: &Array2<A>| matrix.columns().into_iter().map(norm).collect();
-        let residual_norm: Vec<f64> = norms(&residual);
-        let residual_norm = residual_norm.iter().zip(&frame.target_scale);
         let diagnosis = Diagnosis {
             route: Route::Lu,
-            rank: neurons,
-            condition: (largest / smallest).as_f64(),
-            largest_singular_value: largest.as_f64() * unit,
-            smallest_singular_value: smallest.as_f64() * unit,
+            reason: Reason::SquareSystem,
+            rank: Some(neurons),
+            condition: Some((largest / smallest).as_f64()),
+            largest_singular_value: frame.outer_singular_value(largest),
+            smallest_singular_value: Some(frame.outer_singular_value(smallest)),
             lambda: vec![0.0; outputs],
             degrees_of_freedom: vec![neurons as f64; outputs],
-            residual_norm: residual_norm.map(|(r, scale)| r * scale.as_f64()).collect(),
-            beta_norm: norms(&beta),
+            residual_norm: frame.outer_residual_norms(residual.columns().into_iter().map(norm)),
+            beta_norm: beta.columns().into_iter().map(norm).collect(),
             leave_one_out: None,
         };
         Ok(Solution {

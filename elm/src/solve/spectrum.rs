@@ -10,7 +10,7 @@
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
 
 use super::frame::{Frame, Prepared};
-use super::{Diagnosis, LeastSquares, Route, Solution};
+use super::{Diagnosis, LeastSquares, Reason, Route, Solution};
 use crate::error::Result;
 use crate::linalg::{Svd, Triangular};
 use crate::scalar::Scalar;
@@ -48,11 +48,16 @@ pub(crate) struct RowSpectrum<A: Scalar> {
 impl<A: Scalar> Spectrum<A> {
     /// Factorises without keeping the rows.
     pub(crate) fn new(problem: &LeastSquares<'_, A>) -> Result<Self> {
+        Self::from_prepared(Prepared::new(problem))
+    }
+
+    /// As [`new`](Self::new), for a problem that is prepared already.
+    pub(crate) fn from_prepared(prepared: Prepared<A>) -> Result<Self> {
         let Prepared {
             hidden,
             targets,
             frame,
-        } = Prepared::new(problem);
+        } = prepared;
         // Below twice as many rows as columns QR first costs more than it saves.
         if hidden.nrows() >= 2 * hidden.ncols() {
             let Triangular { r, qtb, unreached } = A::triangularise(hidden.view(), targets.view())?;
@@ -86,6 +91,24 @@ impl<A: Scalar> Spectrum<A> {
         })
     }
 
+    /// For a problem of which a QR factorisation has left the triangle: `unreached` is what of each
+    /// output's sum of squares lay outside it.
+    pub(crate) fn from_triangle(prepared: Prepared<A>, unreached: Array1<A>) -> Result<Self> {
+        let mut spectrum = Self::from_prepared(prepared)?;
+        spectrum.route = Route::QrSvd;
+        if spectrum.frame.spanned_by(spectrum.s.len()) {
+            spectrum.unreached.fill(A::zero());
+        } else {
+            spectrum.unreached += &unreached;
+        }
+        Ok(spectrum)
+    }
+
+    /// The level of rounding error in singular values, relative to the largest.
+    pub(crate) fn level(&self) -> A {
+        rounding(self.frame.rows, self.vt.ncols())
+    }
+
     /// The number of singular values above `cutoff` times the largest.
     pub(crate) fn rank(&self, cutoff: A) -> usize {
         let Some(&largest) = self.s.first() else {
@@ -103,6 +126,7 @@ impl<A: Scalar> Spectrum<A> {
         &self,
         gain: &Array2<A>,
         cutoff: A,
+        reason: Reason,
         lambda: Vec<f64>,
         leave_one_out: Option<Vec<f64>>,
     ) -> Solution<A> {
@@ -110,34 +134,37 @@ impl<A: Scalar> Spectrum<A> {
         let beta = self
             .frame
             .restore(A::product(self.vt.t(), (gain * &self.c).view()));
-        let intercept = &self.frame.target_mean - &self.frame.hidden_mean.dot(&beta);
+        let intercept = self.frame.constant(&beta);
 
         // The share of each direction that the fit keeps.
         let kept = gain * &self.s.view().insert_axis(Axis(1));
         let kept = |output: usize| kept.column(output.min(kept.ncols() - 1));
         let constant = f64::from(u8::from(self.frame.intercept));
-        let residual_norm = (0..outputs).map(|o| {
+        let residual_norms = (0..outputs).map(|o| {
             let left = Zip::from(kept(o))
                 .and(self.c.column(o))
                 .fold(A::zero(), |sum, &f, &c| sum + ((A::one() - f) * c).powi(2));
-            (left + self.unreached[o]).sqrt().as_f64() * self.frame.target_scale[o].as_f64()
+            (left + self.unreached[o]).sqrt().as_f64()
         });
         let rank = self.rank(cutoff);
-        let root_weight = self.frame.weight_scale.as_f64().sqrt();
-        let scale = self.frame.hidden_scale.as_f64() * root_weight;
-        let singular_value = |i: usize| self.s.get(i).map_or(0.0, |s| s.as_f64() * scale);
+        let singular_value = |i: usize| {
+            self.s
+                .get(i)
+                .map_or(0.0, |&s| self.frame.outer_singular_value(s))
+        };
         let (largest, smallest) = (singular_value(0), singular_value(rank.max(1) - 1));
         let diagnosis = Diagnosis {
             route: self.route,
-            rank,
-            condition: if rank == 0 { 1.0 } else { largest / smallest },
+            reason,
+            rank: Some(rank),
+            condition: Some(if rank == 0 { 1.0 } else { largest / smallest }),
             largest_singular_value: largest,
-            smallest_singular_value: smallest,
+            smallest_singular_value: Some(smallest),
             lambda,
             degrees_of_freedom: (0..outputs)
                 .map(|o| kept(o).sum().as_f64() + constant)
                 .collect(),
-            residual_norm: residual_norm.map(|norm| norm * root_weight).collect(),
+            residual_norm: self.frame.outer_residual_norms(residual_norms),
             beta_norm: beta.columns().into_iter().map(norm).collect(),
             leave_one_out,
         };

@@ -2,13 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use ndarray::{Array1, Array2, Axis, concatenate, s};
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use ndarray::{Array1, Array2, Axis, s};
 
 use super::Validator;
 use crate::error::{Error, Result};
-use crate::linalg::Triangular;
+use crate::linalg::{Positive, Triangular};
 use crate::scalar::Scalar;
 use crate::solve::check_length;
 use crate::solve::spectrum::rounding;
@@ -295,33 +293,18 @@ impl<A: Scalar> Validator<A> {
 }
 
 /// Solves positive definite equations by Cholesky where that keeps three quarters of the digits,
-/// given rounding errors of epsilon times `noise` in the matrix.
+/// given rounding errors of epsilon times `noise` in the matrix: the trace of the inverse bounds
+/// what they are amplified by.
 fn solve_if_stable<A: Scalar>(
     matrix: &Array2<A>,
     right: &Array2<A>,
     noise: A,
 ) -> Option<Array2<A>> {
-    // The norm of the inverse shows in its action on random signs: for one of norm 1/d to pass
-    // unseen, four sign vectors would all have to be orthogonal to one direction.
-    const PROBES: usize = 4;
-    let n = matrix.nrows();
-    let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let probes = Array2::from_shape_simple_fn((n, PROBES), || {
-        if rng.random::<bool>() {
-            A::one()
-        } else {
-            -A::one()
-        }
-    });
-    let both = concatenate(Axis(1), &[right.view(), probes.view()]).ok()?;
-    let solution = A::solve_positive(matrix.view(), both.view()).ok()?;
-    let (answer, probed) = solution.view().split_at(Axis(1), right.ncols());
+    let Positive { x, inverse_trace } = A::solve_positive(matrix.view(), right.view()).ok()?;
+    // Equations that are all alike are as stable as one of them.
+    let amplification = inverse_trace * noise - A::from_f64(matrix.nrows() as f64);
     let limit = A::epsilon().sqrt().sqrt().recip();
-    let stable = probed
-        .columns()
-        .into_iter()
-        .all(|column| column.dot(&column).sqrt() * noise <= limit);
-    stable.then(|| answer.to_owned())
+    (amplification <= limit).then_some(x)
 }
 
 /// One matrix above another of as many columns.

@@ -3,7 +3,7 @@
 #![allow(dead_code)] // Each test file uses a part.
 
 use elm::Scalar;
-use elm::solve::{LeastSquares, Ridge, Solution, Solver};
+use elm::solve::{Diagnosis, LeastSquares, Ridge, Solution, Solver};
 use ndarray::{Array1, Array2, Axis, concatenate};
 use ndarray_rand::RandomExt;
 use ndarray_rand::rand_distr::{StandardNormal, Uniform};
@@ -52,6 +52,15 @@ pub(crate) fn frobenius<A: Scalar>(matrix: &Array2<A>) -> f64 {
         .map(|v| v.as_f64().powi(2))
         .sum::<f64>()
         .sqrt()
+}
+
+/// What rounding errors are amplified by on the way to the output weights: the condition of the
+/// matrix, or where it was not found that of the regularised normal equations.
+pub(crate) fn amplification(diagnosis: &Diagnosis) -> f64 {
+    diagnosis.condition.unwrap_or_else(|| {
+        let weakest = diagnosis.lambda.iter().copied().fold(1.0, f64::min);
+        2.0 / weakest
+    })
 }
 
 /// A least-squares problem that owns its data, so that rows can be taken away.
