@@ -11,6 +11,7 @@ use elm_datasets::{Invalid, Measurements};
 use super::common::{hint, one_of, progress, usage};
 use super::data::Source;
 use super::{Failure, print};
+use crate::error::Error;
 use crate::features::Features;
 use crate::geometry::pairs;
 use crate::link::Link;
@@ -32,6 +33,9 @@ pub(super) struct Arguments {
     /// 'paper', 'all', or a list of numbers and names, such as '1,39,orange peel'.
     #[arg(long, value_name = "LIST", default_value = "all")]
     materials: String,
+    /// 'all', or a list of models, such as 'gaussian-process,ggx+lambert,elm (paper)'.
+    #[arg(long, value_name = "LIST", default_value = "all")]
+    models: String,
     /// Number of folds, at least 2.
     #[arg(long, value_name = "N", default_value_t = 10)]
     folds: usize,
@@ -50,6 +54,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
+    let models = select(&arguments.models, arguments.seed)?;
     let source = Source::find(arguments.data.as_deref())?;
     let materials = source.select(&arguments.materials)?;
     let data = source.load(&materials, arguments.invalid)?;
@@ -57,10 +62,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Folds::new(data.directions.len(), arguments.folds, arguments.seed).map_err(usage)?;
     hint(&source);
 
-    let models: Vec<Reference> = reference::all()
-        .into_iter()
-        .chain(networks(arguments.seed))
-        .collect();
     let progress = progress("model");
     progress.set_length(models.len() as u64);
     let mut entries = Vec::new();
@@ -79,6 +80,30 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         start.elapsed().as_secs_f64(),
     );
     print(&comparison.render(arguments.format)?)
+}
+
+/// The models of these names, on all the inputs and targets that they come with.
+fn select(list: &str, seed: u64) -> Result<Vec<Reference>, Failure> {
+    let mut models: Vec<Reference> = reference::all().into_iter().chain(networks(seed)).collect();
+    if list.trim() == "all" {
+        return Ok(models);
+    }
+    let names: Vec<&str> = list.split(',').map(str::trim).collect();
+    if let Some(&unknown) = names
+        .iter()
+        .find(|&&name| models.iter().all(|model| model.name != name))
+    {
+        let mut known: Vec<String> = models.into_iter().map(|model| model.name).collect();
+        known.sort_unstable();
+        known.dedup();
+        return Err(usage(Error::UnknownName {
+            what: "model",
+            name: unknown.to_owned(),
+            expected: known.join(", "),
+        }));
+    }
+    models.retain(|model| names.contains(&model.name.as_str()));
+    Ok(models)
 }
 
 /// The paper's network, and the same idea with inputs, target and ridge that suit the task.

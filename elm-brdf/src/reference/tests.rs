@@ -17,10 +17,10 @@ fn all() -> Vec<Reference> {
 /// Directions all over the hemisphere, with mirror reflection and its neighbourhood among them.
 fn directions(count: usize) -> Vec<Pair> {
     (0..count)
-        .map(|i| {
-            let i = i as f64;
+        .map(|number| {
+            let i = number as f64;
             let theta_i = (0.37 * i) % 1.4;
-            if i as usize % 3 == 0 {
+            if number % 3 == 0 {
                 let (near, aside) = ((0.11 * i) % 0.3, (0.23 * i) % 0.4);
                 Pair {
                     incident: cartesian(theta_i, 0.1 * i),
