@@ -111,9 +111,9 @@ pub struct Record {
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
     /// Numerical rank.
-    pub rank: usize,
+    pub rank: Option<usize>,
     /// Condition number.
-    pub condition: f64,
+    pub condition: Option<f64>,
     /// Strength of ridge, relative.
     pub lambda: f64,
     /// Effective degrees of freedom.
@@ -350,7 +350,7 @@ pub(super) fn reference_of(
     let (rows, neurons) = hidden.dim();
     let work = (rows + neurons) * neurons * neurons;
     let plain = diagnosis.lambda.contains(&0.0);
-    let determined = diagnosis.rank == neurons && neurons + usize::from(intercept) <= rows;
+    let determined = diagnosis.rank == Some(neurons) && neurons + usize::from(intercept) <= rows;
     if work > REFERENCE_WORK || (plain && !determined) {
         return None;
     }
