@@ -176,6 +176,10 @@ impl<A: Scalar> Accumulator<A> {
         })
     }
 
+    pub(crate) fn hidden(&self) -> &HiddenLayer<A> {
+        &self.hidden
+    }
+
     /// Number of rows so far.
     #[must_use]
     pub fn rows(&self) -> u64 {

@@ -31,6 +31,9 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use crate::accumulate::Accumulator;
+use crate::activation::Activation;
+use crate::hidden::HiddenLayer;
 use crate::model::Elm;
 use crate::scalar::Scalar;
 
@@ -99,7 +102,7 @@ pub enum Error {
         expected: u32,
     },
     /// Its contents make no sense.
-    #[error("the file's contents are not a {kind}: {reason}")]
+    #[error("the file's contents are not an {kind}: {reason}")]
     Contents {
         /// What was expected.
         kind: &'static str,
@@ -131,6 +134,7 @@ pub trait Persist: Serialize + DeserializeOwned + sealed::Sealed {
 mod sealed {
     pub trait Sealed {}
     impl<A: crate::Scalar> Sealed for crate::Elm<A> {}
+    impl<A: crate::Scalar> Sealed for crate::Accumulator<A> {}
 }
 
 impl<A: Scalar> Persist for Elm<A> {
@@ -138,12 +142,25 @@ impl<A: Scalar> Persist for Elm<A> {
     const SCALAR: &'static str = A::NAME;
 
     fn check(&self) -> Result<(), Error> {
-        match self.hidden().activation() {
-            crate::Activation::Custom(_) => Err(Error::CustomActivation {
-                name: self.hidden().activation().name().to_owned(),
-            }),
-            _ => Ok(()),
-        }
+        not_custom(self.hidden())
+    }
+}
+
+impl<A: Scalar> Persist for Accumulator<A> {
+    const KIND: &'static str = "elm accumulator";
+    const SCALAR: &'static str = A::NAME;
+
+    fn check(&self) -> Result<(), Error> {
+        not_custom(self.hidden())
+    }
+}
+
+fn not_custom<A: Scalar>(hidden: &HiddenLayer<A>) -> Result<(), Error> {
+    match hidden.activation() {
+        Activation::Custom(_) => Err(Error::CustomActivation {
+            name: hidden.activation().name().to_owned(),
+        }),
+        _ => Ok(()),
     }
 }
 

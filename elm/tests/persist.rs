@@ -3,8 +3,9 @@
 #![allow(clippy::unwrap_used)]
 
 use elm::persist::{self, Error};
-use elm::{Activation, Elm, ElmParams};
-use ndarray::{Array2, array};
+use elm::solve::Ridge;
+use elm::{Accumulator, Activation, Elm, ElmParams};
+use ndarray::{Array2, array, s};
 use proptest::prelude::*;
 
 fn data() -> (Array2<f64>, Array2<f64>) {
@@ -97,6 +98,29 @@ fn files_are_written_whole_in_the_form_their_name_asks_for() {
 }
 
 #[test]
+fn an_accumulator_goes_on_where_its_file_left_off() {
+    let (x, t) = data();
+    let params = ElmParams::new(8)
+        .solver(Ridge::relative(1e-6))
+        .check()
+        .unwrap();
+    let mut whole = Accumulator::from_sample(&params, &x, 2).unwrap();
+    let mut parts = whole.clone();
+    whole.push(&x, &t).unwrap();
+    parts
+        .push(&x.slice(s![..11, ..]), &t.slice(s![..11, ..]))
+        .unwrap();
+    let bytes = persist::to_bytes(&parts).unwrap();
+    let mut parts: Accumulator<f64> = persist::from_bytes(&bytes).unwrap();
+    parts
+        .push(&x.slice(s![11.., ..]), &t.slice(s![11.., ..]))
+        .unwrap();
+    assert_eq!(parts.fit().unwrap(), whole.fit().unwrap());
+    let error = persist::from_bytes::<Elm<f64>>(&bytes).unwrap_err();
+    assert!(matches!(error, Error::Kind { .. }), "{error}");
+}
+
+#[test]
 fn a_custom_activation_is_refused_by_name() {
     let (x, t) = data();
     let cube = Activation::custom("cube", |z: f64| z * z * z);
@@ -169,7 +193,7 @@ fn a_file_that_contradicts_itself_is_refused() {
         mutate(&|c| c["direct_links"] = serde_json::json!(true)),
     ] {
         assert!(
-            error.starts_with("the file's contents are not a elm model"),
+            error.starts_with("the file's contents are not an elm model"),
             "{error}"
         );
     }

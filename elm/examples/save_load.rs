@@ -1,0 +1,36 @@
+//! Fits, saves, loads and asks how sure the network is:
+//!
+//! `cargo run --release -p elm-learn --example save_load`
+
+#![allow(clippy::print_stdout)]
+
+use std::error::Error;
+
+use elm::{Elm, ElmParams, persist};
+use elm_datasets::toy;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let data = toy::friedman3(500, 0.1, 1)?;
+    let tuned = ElmParams::auto().tune(&data.inputs, &data.targets)?;
+
+    let path = std::env::temp_dir().join("friedman3.elm");
+    persist::save(&tuned.model, &path)?;
+    let model: Elm<f64> = persist::load(&path)?;
+    assert_eq!(model, tuned.model);
+    println!("saved to and loaded from {}", path.display());
+
+    let uncertain = tuned.params.fit_uncertain(&data.inputs, &data.targets)?;
+    let new = toy::friedman3(5, 0.1, 2)?;
+    let (low, high) = uncertain.predict_interval(&new.inputs, 0.9)?;
+    let predicted = model.predict(&new.inputs)?;
+    for row in 0..5 {
+        println!(
+            "predicted {:.3}, 90 % interval {:.3} to {:.3}, observed {:.3}",
+            predicted[[row, 0]],
+            low[[row, 0]],
+            high[[row, 0]],
+            new.targets[[row, 0]],
+        );
+    }
+    Ok(())
+}
