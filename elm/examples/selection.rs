@@ -27,11 +27,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
 
-    let shared = ElmParams::auto().tune(&data.inputs, &data.targets)?;
-    let own = ElmParams::auto()
-        .per_input(true)
-        .budget(80)
+    let shared = ElmParams::auto()
+        .per_input(false)
         .tune(&data.inputs, &data.targets)?;
+    let own = ElmParams::auto().tune(&data.inputs, &data.targets)?;
     let deviation = data.targets.std_axis(ndarray::Axis(0), 0.0)[0];
     println!(
         "tuned, one scale:        {:.3}",

@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     );
     println!("rmse against the noiseless curve: {error:.4} (noise in the samples: 0.1)");
 
-    let x = Array1::linspace(-12.0, 12.0, 481);
+    let x = Array1::linspace(-10.0, 10.0, 401);
     let inputs = x.clone().insert_axis(Axis(1));
     let y = model.model().predict(&inputs)?;
     let (low, high) = model.predict_interval(&inputs, 0.9)?;
@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .margin(12)
         .x_label_area_size(28)
         .y_label_area_size(44)
-        .build_cartesian_2d(-12.0..12.0, -0.6..1.3)?;
+        .build_cartesian_2d(-10.0..10.0, -0.6..1.3)?;
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)

@@ -8,7 +8,7 @@
 //! 1. a coarse grid of scales, a factor of $\sqrt{10}$ apart, at a moderate number of neurons;
 //! 2. unless it is given, the number of neurons: doubled as long as that pays;
 //! 3. the scale again, in smaller and smaller steps;
-//! 4. on request, a scale for each input, one after the other: inputs that do not matter shrink.
+//! 4. if wanted, a scale for each input, one after the other: inputs that do not matter shrink.
 //!
 //! In 2 and 4, where a search could follow noise, a step pays only if the held-out errors fall by
 //! more than one standard error of their difference, row by row.
@@ -90,11 +90,11 @@ pub struct Tuned<A: Scalar> {
 ///
 /// | name | default | purpose | range |
 /// |---|---|---|---|
-/// | [`budget`](Self::budget) | 24 | factorisations to spend on the search | at least 1 |
+/// | [`budget`](Self::budget) | 24; 60 for `auto` | factorisations to spend on the search | at least 1 |
 /// | [`criterion`](Self::criterion) | leave-one-out | the error that is made small | at least 2 folds |
 /// | [`max_neurons`](Self::max_neurons) | 1000 | where doubling ends when the number is not given | at least 1 |
 /// | [`search_rows`](Self::search_rows) | 3000 | rows that the search looks at, drawn at random | at least 2 |
-/// | [`per_input`](Self::per_input) | off | whether each input gets a scale of its own | |
+/// | [`per_input`](Self::per_input) | off; on for `auto` | whether each input gets a scale of its own | |
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tuner<A: Scalar> {
     base: ElmParams<A>,
@@ -108,8 +108,8 @@ pub struct Tuner<A: Scalar> {
 }
 
 impl<A: Scalar> ElmParams<A> {
-    /// Chooses everything: neurons, weight scale and regularisation, for tanh neurons with their
-    /// biases on the data.
+    /// Chooses everything: neurons, weight scale, a scale per input and regularisation, for tanh
+    /// neurons with their biases on the data, within 60 factorisations.
     #[must_use]
     pub fn auto() -> Tuner<A> {
         let base = Self::new(1)
@@ -117,6 +117,8 @@ impl<A: Scalar> ElmParams<A> {
             .biases(Biases::OnData);
         Tuner {
             neurons: None,
+            per_input: true,
+            budget: 60,
             ..base.tuner()
         }
     }
