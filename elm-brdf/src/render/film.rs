@@ -44,9 +44,9 @@ impl Film {
     }
 
     /// Which pixels would visibly change with more samples, up to `total` each: those with an edge
-    /// of a shape or a hard shadow in them or beside them, and those whose error passes half a
-    /// display step.
-    pub(crate) fn unfinished(&self, total: u32, gain: f64) -> Vec<bool> {
+    /// of a shape or a hard shadow in them or beside them, and those whose error passes `steps`
+    /// display steps.
+    pub(crate) fn unfinished(&self, total: u32, gain: f64, steps: f64) -> Vec<bool> {
         let errors: Vec<f32> = self
             .pixels
             .iter()
@@ -69,7 +69,9 @@ impl Film {
                 unfinished[at] = edge_or_noise.into_iter().any(|near| {
                     let pixel = &self.pixels[near];
                     // The neighbours' errors stand in for what few samples have not yet seen.
-                    pixel.mixed || pixel.signature != own.signature || errors[near] > 0.5
+                    pixel.mixed
+                        || pixel.signature != own.signature
+                        || f64::from(errors[near]) > steps
                 });
             }
         }
@@ -143,10 +145,14 @@ mod tests {
 
     #[test]
     fn an_even_picture_is_finished_and_a_complete_one_is_too() {
-        assert!(!film(|_, _| (0.3, 1)).unfinished(16, 1.0).contains(&true));
+        assert!(
+            !film(|_, _| (0.3, 1))
+                .unfinished(16, 1.0, 0.5)
+                .contains(&true)
+        );
         assert!(
             !film(|p, n| (f64::from(p * n), n.into()))
-                .unfinished(4, 1.0)
+                .unfinished(4, 1.0, 0.5)
                 .contains(&true)
         );
     }
@@ -154,7 +160,7 @@ mod tests {
     #[test]
     fn an_edge_keeps_its_neighbourhood_going() {
         let film = film(|pixel, n| (0.3, u64::from(pixel == 12 && n == 2)));
-        let unfinished = film.unfinished(16, 1.0);
+        let unfinished = film.unfinished(16, 1.0, 0.5);
         let expected = [6, 7, 8, 11, 12, 13, 16, 17, 18];
         assert!((0..25).all(|p| unfinished[p] == expected.contains(&p)));
     }
@@ -164,9 +170,9 @@ mod tests {
         // Standard deviation s of the samples: an error of 3 s sqrt(1/4 - 1/16) in radiance. At
         // 0.2 the slope is about 1.12, so that s = 0.001 is 0.37 steps and s = 0.003 over one.
         let noisy = |s: f64| film(move |_, n| (0.2 + s * [-1.0, 1.0][n as usize % 2], 1));
-        assert!(!noisy(0.001).unfinished(16, 1.0).contains(&true));
-        assert!(!noisy(0.003).unfinished(16, 1.0).contains(&false));
+        assert!(!noisy(0.001).unfinished(16, 1.0, 0.5).contains(&true));
+        assert!(!noisy(0.003).unfinished(16, 1.0, 0.5).contains(&false));
         // Brighter by three stops the first is over it too.
-        assert!(noisy(0.001).unfinished(16, 4.0).contains(&true));
+        assert!(noisy(0.001).unfinished(16, 4.0, 0.5).contains(&true));
     }
 }

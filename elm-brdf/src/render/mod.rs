@@ -126,6 +126,17 @@ pub fn render(
     options: Options,
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<Rendering> {
+    render_within(scene, supply, options, 0.5, progress)
+}
+
+/// As [`render`], with bounds of `steps` display steps.
+fn render_within(
+    scene: &Scene,
+    supply: &dyn Supply,
+    options: Options,
+    steps: f64,
+    progress: &(dyn Fn(u64, u64) + Sync),
+) -> Result<Rendering> {
     let start = Instant::now();
     let threads = match options.threads {
         0 => std::thread::available_parallelism().map_or(1, usize::from),
@@ -147,7 +158,7 @@ pub fn render(
     if !options.savings.materials {
         shelf.fill()?;
     }
-    let mut picture = Picture::new(scene, &world, &shelf, options.savings);
+    let mut picture = Picture::new(scene, &world, &shelf, options.savings, steps);
     pool.install(|| picture.take_all(progress))?;
     let mut rendering = picture.finish();
     let account = &mut rendering.account;
@@ -166,7 +177,13 @@ struct Picture<'a> {
 }
 
 impl<'a> Picture<'a> {
-    fn new(scene: &'a Scene, world: &'a World, shelf: &'a Shelf<'a>, savings: Savings) -> Self {
+    fn new(
+        scene: &'a Scene,
+        world: &'a World,
+        shelf: &'a Shelf<'a>,
+        savings: Savings,
+        steps: f64,
+    ) -> Self {
         let image = &scene.image;
         let gain = image.exposure.exp2();
         Self {
@@ -179,9 +196,10 @@ impl<'a> Picture<'a> {
                 depth: image.depth,
                 seed: image.seed,
                 samples_per_pixel: image.samples,
-                // Half a step of 8-bit sRGB where its slope is steepest, 12.92 at black.
-                tolerance: 0.5 / (255.0 * 12.92 * gain),
+                // Steps of 8-bit sRGB where its slope is steepest, 12.92 at black.
+                tolerance: steps / (255.0 * 12.92 * gain),
                 gain,
+                steps,
             },
             film: Mutex::new(Film::new(image.width, image.height)),
             tally: Mutex::new(Tally::new(world.materials.len())),
@@ -222,7 +240,7 @@ impl<'a> Picture<'a> {
             if self.tracer.savings.samples && taken < total {
                 let film = self.film.get_mut().unwrap_or_else(PoisonError::into_inner);
                 let before = wanted.iter().filter(|w| **w).count();
-                wanted = film.unfinished(total, self.gain);
+                wanted = film.unfinished(total, self.gain, self.tracer.steps);
                 // A pixel that stopped stays stopped: its samples would no longer be the first.
                 for (pixel, wanted) in wanted.iter_mut().enumerate() {
                     *wanted &= film.samples(pixel) == taken;

@@ -141,9 +141,11 @@ impl Proxy {
         }
         let step = ((cosine.min(1.0).acos() / FRAC_PI_2 * THETAS as f64) as usize).min(THETAS - 1);
         let (near, far) = cosines(step);
-        let between = (outgoing[0] * incident[1] - outgoing[1] * incident[0])
-            .atan2(outgoing[0] * incident[0] + outgoing[1] * incident[1]);
-        let point = [between.abs() / PI, (step as f64 + 0.5) / THETAS as f64];
+        // From the viewer's own azimuth, as in `sample`: along the normal that is 0 by convention.
+        let azimuth = |w: Vector| w[1].atan2(w[0]);
+        let between = (azimuth(incident) - azimuth(outgoing)).abs();
+        let between = between.min(TAU - between);
+        let point = [between / PI, (step as f64 + 0.5) / THETAS as f64];
         self.view(outgoing).density(point) / (THETAS as f64 * (near - far) * TAU)
     }
 }

@@ -4,7 +4,7 @@ use super::account::Account;
 use super::error::SceneError;
 use super::scene::Scene;
 use super::supply::Supply;
-use super::{Options, Rendering, render};
+use super::{Options, Rendering, render_within};
 use crate::error::Result;
 
 /// Pictures of one size in rows and columns, rendered as one picture.
@@ -78,11 +78,11 @@ impl Sheet {
         }
     }
 
-    /// Renders every panel, as [`render`] does one scene; all have the size and the exposure of
+    /// Renders every panel, as [`render`](super::render) does one scene; all have the size and the exposure of
     /// the first.
     ///
     /// # Errors
-    /// As [`render`]; [`SceneError::Sheet`] for panels of different sizes, and for a difference
+    /// As [`render`](super::render); [`SceneError::Sheet`] for panels of different sizes, and for a difference
     /// from a panel that does not come before it.
     pub fn render(
         &self,
@@ -94,10 +94,12 @@ impl Sheet {
         let mut done: Vec<Rendering> = Vec::with_capacity(self.panels.len());
         for (index, panel) in self.panels.iter().enumerate() {
             let rendering = match &panel.content {
-                Content::Scene(scene) => render(scene, supply, options, &|part, whole| {
-                    // Panels of one size take about as long as each other.
-                    progress(index as u64 * whole + part, count * whole);
-                })?,
+                Content::Scene(scene) => {
+                    render_within(scene, supply, options, self.steps(index), &|part, whole| {
+                        // Panels of one size take about as long as each other.
+                        progress(index as u64 * whole + part, count * whole);
+                    })?
+                }
                 Content::Difference { of, from, factor } => {
                     match (done.get(*of), done.get(*from)) {
                         (Some(a), Some(b)) if a.pixels.len() == b.pixels.len() => {
@@ -110,6 +112,18 @@ impl Sheet {
             done.push(rendering);
         }
         Ok(self.compose(&done)?)
+    }
+
+    /// The bound on a panel's errors in display steps: as much smaller as a difference enlarges
+    /// them.
+    fn steps(&self, panel: usize) -> f64 {
+        let factors = self.panels.iter().filter_map(|other| match other.content {
+            Content::Difference { of, from, factor } => {
+                (of == panel || from == panel).then_some(factor.abs())
+            }
+            Content::Scene(_) => None,
+        });
+        0.5 / factors.fold(1.0, f64::max)
     }
 
     fn compose(&self, panels: &[Rendering]) -> Result<Rendering, SceneError> {

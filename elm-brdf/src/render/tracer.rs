@@ -34,6 +34,8 @@ pub(crate) struct Tracer<'a> {
     pub(crate) tolerance: f64,
     /// Factor on the radiance before display.
     pub(crate) gain: f64,
+    /// What a sample may lose by smaller networks, in display steps.
+    pub(crate) steps: f64,
 }
 
 /// What a sample of a pixel found.
@@ -315,7 +317,7 @@ impl Tracer<'_> {
         };
         let weight = scaled(times(path.throughput, arriving), cosine * share);
         // The first surface's own light adds up over the lights, each with its share of the bound.
-        let steps = 0.5 / self.world.lights.len() as f64;
+        let steps = self.steps / self.world.lights.len() as f64;
         let small = self.savings.networks
             && surface == 0
             && material.small_is_enough(&pair, weight, self.gain, steps);
