@@ -18,8 +18,9 @@
 //! # Ok::<(), elm::Error>(())
 //! ```
 //!
-//! - [`ElmParams`] holds the settings, [`Elm`] the fitted network.
-//! - [`Activation`] is the neurons' function, one of seven or your own.
+//! - [`ElmParams`] holds the settings, [`Elm`] the fitted network, [`Predictor`]
+//!   its weights packed for evaluation.
+//! - [`Activation`] is the neurons' function, one of eight or your own.
 //! - [`solve`] has the solvers: equations 10 and 11 of the ELM literature, and ridge regression
 //!   with its strength chosen by exact leave-one-out, which is the default.
 //! - [`metrics`] has RMSE, MAE and correlation.
@@ -42,14 +43,17 @@ mod hidden;
 mod linalg;
 pub mod metrics;
 mod model;
+mod predictor;
 mod scalar;
 mod scaler;
+mod simd;
 pub mod solve;
 
-pub use activation::Activation;
+pub use activation::{Accuracy, Activation};
 pub use error::{Error, Result};
 pub use hidden::{Distribution, HiddenLayer};
 pub use linalg::backend;
 pub use model::{CheckedParams, Elm, ElmParams, Targets};
+pub use predictor::{Predictor, Scratch};
 pub use scalar::Scalar;
 pub use scaler::Scaler;
