@@ -2,7 +2,7 @@
 
 use ndarray::{Array2, ArrayView2};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geometry::Pair;
 
 /// A reflectance model, possibly of several channels, or of several materials side by side.
@@ -15,6 +15,10 @@ pub trait Brdf {
     /// # Errors
     /// Where a value cannot be computed, such as for a direction that is not finite.
     fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>>;
+
+    /// Numbers that must be stored to evaluate one channel, the largest where channels differ:
+    /// coefficients, scales and measurements kept, but nothing that a seed regenerates.
+    fn floats_per_channel(&self) -> usize;
 }
 
 /// A way to make a [`Brdf`] from measurements.
@@ -27,4 +31,46 @@ pub trait Fit {
     /// # Errors
     /// Where these measurements cannot be fitted.
     fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>>;
+}
+
+/// What every method asks of measurements: at least one, one row of values per pair of
+/// directions, and all numbers finite.
+pub(crate) fn check(pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<()> {
+    if values.is_empty() {
+        return Err(Error::Elm(elm::Error::Empty {
+            what: "measurements",
+            rows: values.nrows(),
+            columns: values.ncols(),
+        }));
+    }
+    if values.nrows() != pairs.len() {
+        return Err(Error::Elm(elm::Error::Shape {
+            what: "rows of values",
+            expected: pairs.len(),
+            found: values.nrows(),
+        }));
+    }
+    if let Some(((row, column), _)) = values.indexed_iter().find(|(_, v)| !v.is_finite()) {
+        return Err(Error::Elm(elm::Error::NotFinite {
+            what: "measurements",
+            row,
+            column,
+        }));
+    }
+    check_directions(pairs)
+}
+
+/// All components finite; in the error, columns count those of the light, then the viewer's.
+pub(crate) fn check_directions(pairs: &[Pair]) -> Result<()> {
+    for (row, pair) in pairs.iter().enumerate() {
+        let mut components = pair.incident.iter().chain(&pair.outgoing);
+        if let Some(column) = components.position(|c| !c.is_finite()) {
+            return Err(Error::Elm(elm::Error::NotFinite {
+                what: "directions",
+                row,
+                column,
+            }));
+        }
+    }
+    Ok(())
 }

@@ -17,6 +17,10 @@ pub enum Error {
     /// The network could not be fitted or evaluated.
     #[error(transparent)]
     Elm(#[from] elm::Error),
+    /// Files could not be fetched.
+    #[cfg(feature = "fetch")]
+    #[error(transparent)]
+    Fetch(#[from] crate::fetch::Error),
     /// So many folds are impossible.
     #[error("{folds} folds of {rows} measurements: expected 2 to {rows} folds")]
     Folds {
@@ -24,6 +28,16 @@ pub enum Error {
         folds: usize,
         /// The measurements there are.
         rows: usize,
+    },
+    /// A method is not made for so many measurements.
+    #[error("{method} of {rows} measurements: expected at most {most}")]
+    TooManyRows {
+        /// The method.
+        method: &'static str,
+        /// The measurements there are.
+        rows: usize,
+        /// The most that it takes.
+        most: usize,
     },
     /// A folder that was asked for does not exist.
     #[error("{}: there is no such folder", path.display())]

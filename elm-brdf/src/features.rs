@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use ndarray::Array2;
+use ndarray::{Array2, ArrayViewMut1};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
@@ -21,17 +21,40 @@ pub enum Features {
     /// the spread of the random weight on $\cos\theta_i$, so leaving it out would be another model.
     #[default]
     Paper,
+    /// $\theta_h$, $\theta_d$, $\cos\theta_i + \cos\theta_o$, $\cos\theta_i \cos\theta_o$ and
+    /// $\sin\theta_i \sin\theta_o \cos(\varphi_i - \varphi_o)$. Reciprocal.
+    HalfDiff,
+    /// $\cos\theta_h$, $\cos\theta_d$, $\cos\theta_i$ and $\cos\theta_o$. Tells light from
+    /// viewer, as measurements do that are not reciprocal.
+    Cosines,
+    /// $\cos\theta_h$, $\cos\theta_d$, $\cos\theta_i + \cos\theta_o$ and
+    /// $\cos\theta_i \cos\theta_o$. Reciprocal.
+    ReciprocalCosines,
+    /// $\sqrt{\theta_h}$, $\cos\theta_d$, $\cos\theta_i \cos\theta_o$ and
+    /// $\cos\theta_i + \cos\theta_o$: the root spreads out the angles where a mirror-like
+    /// highlight changes fast. Reciprocal.
+    Highlight,
 }
 
 impl Features {
     /// Every set there is.
-    pub const ALL: [Self; 1] = [Self::Paper];
+    pub const ALL: [Self; 5] = [
+        Self::Paper,
+        Self::HalfDiff,
+        Self::Cosines,
+        Self::ReciprocalCosines,
+        Self::Highlight,
+    ];
 
     /// The set's name.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Paper => "paper",
+            Self::HalfDiff => "half-diff",
+            Self::Cosines => "cosines",
+            Self::ReciprocalCosines => "reciprocal-cosines",
+            Self::Highlight => "highlight",
         }
     }
 
@@ -47,20 +70,57 @@ impl Features {
                 "cos theta_e",
                 "sin theta_e",
             ],
+            Self::HalfDiff => &[
+                "theta_h",
+                "theta_d",
+                "cos theta_i + cos theta_o",
+                "cos theta_i cos theta_o",
+                "sin theta_i sin theta_o cos dphi",
+            ],
+            Self::Cosines => &["cos theta_h", "cos theta_d", "cos theta_i", "cos theta_o"],
+            Self::ReciprocalCosines => &[
+                "cos theta_h",
+                "cos theta_d",
+                "cos theta_i + cos theta_o",
+                "cos theta_i cos theta_o",
+            ],
+            Self::Highlight => &[
+                "sqrt theta_h",
+                "cos theta_d",
+                "cos theta_i cos theta_o",
+                "cos theta_i + cos theta_o",
+            ],
         }
     }
 
+    /// Whether exchanging light and viewer changes no input, not even by a rounding: a model of
+    /// these inputs is then reciprocal by construction.
+    #[must_use]
+    pub fn is_reciprocal(self) -> bool {
+        !matches!(self, Self::Paper | Self::Cosines)
+    }
+
     /// The inputs of each pair of directions, shape (pairs, inputs).
+    ///
+    /// All sets depend on the angles $\theta_i$, $\theta_o$ and $|\varphi_i - \varphi_o|$ alone, as
+    /// an isotropic surface does. Finite for every pair of unit vectors, those below the horizon,
+    /// grazing or coincident included.
     #[must_use]
     pub fn compute(self, pairs: &[Pair]) -> Array2<f64> {
         let mut out = Array2::zeros((pairs.len(), self.inputs().len()));
-        for (mut row, pair) in out.rows_mut().into_iter().zip(pairs) {
-            let values = match self {
-                Self::Paper => paper(pair),
-            };
+        let fill = |mut row: ArrayViewMut1<'_, f64>, values: &[f64]| {
             row.iter_mut()
                 .zip(values)
-                .for_each(|(input, value)| *input = value);
+                .for_each(|(input, &value)| *input = value);
+        };
+        for (row, pair) in out.rows_mut().into_iter().zip(pairs) {
+            match self {
+                Self::Paper => fill(row, &paper(pair)),
+                Self::HalfDiff => fill(row, &half_diff(pair)),
+                Self::Cosines => fill(row, &cosines(pair)),
+                Self::ReciprocalCosines => fill(row, &reciprocal_cosines(pair)),
+                Self::Highlight => fill(row, &highlight(pair)),
+            }
         }
         out
     }
@@ -76,6 +136,44 @@ fn paper(pair: &Pair) -> [f64; 6] {
         sine(l),
         v[2],
         sine(v),
+    ]
+}
+
+fn half_diff(pair: &Pair) -> [f64; 5] {
+    let (l, v) = (pair.incident, pair.outgoing);
+    let angles = pair.half_difference();
+    [
+        angles.theta_h(),
+        angles.theta_d(),
+        l[2] + v[2],
+        l[2] * v[2],
+        l[0] * v[0] + l[1] * v[1],
+    ]
+}
+
+fn cosines(pair: &Pair) -> [f64; 4] {
+    let angles = pair.half_difference();
+    [
+        angles.cos_theta_h(),
+        angles.cos_theta_d(),
+        pair.incident[2],
+        pair.outgoing[2],
+    ]
+}
+
+fn reciprocal_cosines(pair: &Pair) -> [f64; 4] {
+    let [cos_h, cos_d, cos_i, cos_o] = cosines(pair);
+    [cos_h, cos_d, cos_i + cos_o, cos_i * cos_o]
+}
+
+fn highlight(pair: &Pair) -> [f64; 4] {
+    let angles = pair.half_difference();
+    let (cos_i, cos_o) = (pair.incident[2], pair.outgoing[2]);
+    [
+        angles.theta_h().sqrt(),
+        angles.cos_theta_d(),
+        cos_i * cos_o,
+        cos_i + cos_o,
     ]
 }
 
@@ -104,7 +202,8 @@ impl FromStr for Features {
 mod tests {
     use super::*;
     use crate::geometry::cartesian;
-    use std::f64::consts::{FRAC_PI_3, FRAC_PI_6, PI};
+    use proptest::prelude::*;
+    use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, FRAC_PI_6, PI};
 
     #[test]
     fn the_papers_inputs_at_hand_computed_directions() {
@@ -118,6 +217,72 @@ mod tests {
         let expected = [half_root_3, half_root_3, half_root_3, 0.5, 0.5, half_root_3];
         let x = Features::Paper.compute(&[pair]);
         approx::assert_abs_diff_eq!(x, ndarray::arr2(&[expected]), epsilon = 1e-15);
+    }
+
+    #[test]
+    fn the_other_sets_at_hand_computed_directions() {
+        // Retro-reflection at 60 degrees: the half vector is the direction itself.
+        let direction = cartesian(FRAC_PI_3, 0.4);
+        let pair = Pair {
+            incident: direction,
+            outgoing: direction,
+        };
+        let expected: [(Features, &[f64]); 4] = [
+            (Features::HalfDiff, &[FRAC_PI_3, 0.0, 1.0, 0.25, 0.75]),
+            (Features::Cosines, &[0.5, 1.0, 0.5, 0.5]),
+            (Features::ReciprocalCosines, &[0.5, 1.0, 1.0, 0.25]),
+            (Features::Highlight, &[FRAC_PI_3.sqrt(), 1.0, 0.25, 1.0]),
+        ];
+        for (set, values) in expected {
+            let x = set.compute(&[pair]);
+            approx::assert_abs_diff_eq!(x.row(0), ndarray::aview1(values), epsilon = 1e-15);
+        }
+    }
+
+    #[test]
+    fn inputs_are_finite_where_directions_coincide_graze_or_oppose() {
+        let normal = NORMAL;
+        let horizon = cartesian(FRAC_PI_2, 0.0);
+        let opposite = [-1.0, 0.0, 0.0];
+        let below = [0.0, 0.6, -0.8];
+        for incident in [normal, horizon, opposite, below] {
+            for outgoing in [normal, horizon, opposite, below] {
+                let pair = Pair { incident, outgoing };
+                for set in Features::ALL {
+                    let x = set.compute(&[pair]);
+                    assert_eq!(x.ncols(), set.inputs().len());
+                    assert!(x.iter().all(|v| v.is_finite()), "{set} {pair:?}");
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn reciprocal_sets_are_so_to_the_last_bit_and_all_sets_are_isotropic(
+            theta_i in 0.0..FRAC_PI_2, phi_i in -PI..PI,
+            theta_o in 0.0..FRAC_PI_2, phi_o in -PI..PI, turn in -PI..PI,
+        ) {
+            let pair = |turn: f64, sign: f64| Pair {
+                incident: cartesian(theta_i, sign * (phi_i + turn)),
+                outgoing: cartesian(theta_o, sign * (phi_o + turn)),
+            };
+            let original = pair(0.0, 1.0);
+            for set in Features::ALL {
+                let x = set.compute(&[original]);
+                if set.is_reciprocal() {
+                    prop_assert_eq!(&x, &set.compute(&[original.swapped()]));
+                }
+                // Rounding of the azimuths moves the half vector by 1e-15 / cos(theta_d), and
+                // the root of an angle by the root of that at most.
+                let moved = 4e-15 / original.half_difference().cos_theta_d();
+                let tolerance = if set == Features::Highlight { moved.sqrt() } else { moved };
+                for other in [pair(turn, 1.0), pair(turn, -1.0)] {
+                    let other = set.compute(&[other]);
+                    prop_assert!(x.iter().zip(&other).all(|(a, b)| (a - b).abs() <= tolerance));
+                }
+            }
+        }
     }
 
     #[test]

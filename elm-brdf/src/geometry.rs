@@ -66,6 +66,85 @@ impl Pair {
             outgoing: self.incident,
         }
     }
+
+    /// Whether both directions lie above the surface: nothing is reflected otherwise.
+    #[must_use]
+    pub fn is_above_horizon(&self) -> bool {
+        self.incident[2] > 0.0 && self.outgoing[2] > 0.0
+    }
+
+    /// The half and difference angles.
+    #[must_use]
+    pub fn half_difference(&self) -> HalfDifference {
+        let (l, v) = (self.incident, self.outgoing);
+        let sum = [l[0] + v[0], l[1] + v[1], l[2] + v[2]];
+        let difference = [l[0] - v[0], l[1] - v[1], l[2] - v[2]];
+        HalfDifference {
+            along: sum[2],
+            across: sum[0].hypot(sum[1]),
+            sum: dot(sum, sum).sqrt(),
+            difference: dot(difference, difference).sqrt(),
+        }
+    }
+}
+
+/// The angles of S. Rusinkiewicz, *A New Change of Variables for Efficient BRDF Representation*,
+/// EGWR 1998: $\theta_h$ between the normal and the half vector, $\theta_d$ between the light and
+/// the half vector, which is half the angle between light and viewer.
+///
+/// Computed from the lengths of $\omega_i + \omega_o$ and $\omega_i - \omega_o$, which are
+/// $2 \cos\theta_d$ and $2 \sin\theta_d$, so that both angles keep their digits where light,
+/// viewer, mirror direction or normal coincide (an arc cosine loses half of them there). Exchanging
+/// light and viewer changes no bit. Where the two are opposite there is no half vector, and
+/// $\theta_h$ is taken as 0.
+///
+/// ```
+/// use elm_brdf::geometry::{Pair, cartesian};
+/// let pair = Pair { incident: cartesian(0.2, 0.0), outgoing: cartesian(1.0, 0.0) };
+/// let angles = pair.half_difference();
+/// assert!((angles.theta_h() - 0.6).abs() < 1e-15);
+/// assert!((angles.theta_d() - 0.4).abs() < 1e-15);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HalfDifference {
+    /// Component of $\omega_i + \omega_o$ along the normal.
+    along: f64,
+    /// Length of its part in the plane of the surface.
+    across: f64,
+    /// $|\omega_i + \omega_o|$.
+    sum: f64,
+    /// $|\omega_i - \omega_o|$.
+    difference: f64,
+}
+
+impl HalfDifference {
+    /// $\theta_h$ in radians, at most $\pi/2$ for directions above the surface.
+    #[must_use]
+    pub fn theta_h(&self) -> f64 {
+        self.across.atan2(self.along)
+    }
+
+    /// $\theta_d$ in radians, 0 to $\pi/2$.
+    #[must_use]
+    pub fn theta_d(&self) -> f64 {
+        self.difference.atan2(self.sum)
+    }
+
+    /// $\cos\theta_h$.
+    #[must_use]
+    pub fn cos_theta_h(&self) -> f64 {
+        if self.sum > 0.0 {
+            self.along / self.sum
+        } else {
+            1.0
+        }
+    }
+
+    /// $\cos\theta_d$.
+    #[must_use]
+    pub fn cos_theta_d(&self) -> f64 {
+        self.sum / self.sum.hypot(self.difference)
+    }
 }
 
 impl From<&Directions> for Pair {
@@ -87,7 +166,7 @@ pub fn pairs(directions: &[Directions]) -> Vec<Pair> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use approx::assert_abs_diff_eq;
+    use approx::{assert_abs_diff_eq, assert_relative_eq};
     use proptest::prelude::*;
     use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_3, FRAC_PI_4, PI};
 
@@ -121,7 +200,58 @@ mod tests {
         assert_eq!(half_vector([1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]), None);
     }
 
+    #[test]
+    fn half_and_difference_angles_keep_their_digits_near_coincidence() {
+        // In one plane theta_h is the mean of the two angles and theta_d half their difference;
+        // an arc cosine would return 0 for both.
+        let pair = Pair {
+            incident: cartesian(3e-9, 0.0),
+            outgoing: cartesian(1e-9, 0.0),
+        };
+        let angles = pair.half_difference();
+        assert_relative_eq!(angles.theta_h(), 2e-9, max_relative = 1e-14);
+        assert_relative_eq!(angles.theta_d(), 1e-9, max_relative = 1e-14);
+    }
+
+    #[test]
+    fn grazing_and_opposite_directions_have_finite_angles() {
+        // Light and viewer at the horizon on opposite sides: the half vector is the normal where
+        // it exists. The heights are exact, the rounding of the horizontal parts cancels.
+        for height in [1e-3, 1e-9, 1e-300, 0.0] {
+            let pair = Pair {
+                incident: [1.0, 0.0, height],
+                outgoing: [-1.0, 0.0, height],
+            };
+            let angles = pair.half_difference();
+            assert_eq!(angles.theta_h(), 0.0);
+            assert_eq!(angles.cos_theta_h(), 1.0);
+            assert_relative_eq!(angles.theta_d(), FRAC_PI_2 - height, epsilon = 1e-9);
+            assert_relative_eq!(angles.cos_theta_d(), height, max_relative = 1e-6);
+        }
+    }
+
     proptest! {
+        #[test]
+        fn half_and_difference_angles_are_those_of_the_vectors_and_reciprocal(
+            theta_i in 0.0..FRAC_PI_2, phi_i in -PI..PI,
+            theta_o in 0.0..FRAC_PI_2, phi_o in -PI..PI,
+        ) {
+            let pair = Pair {
+                incident: cartesian(theta_i, phi_i),
+                outgoing: cartesian(theta_o, phi_o),
+            };
+            let angles = pair.half_difference();
+            let h = half_vector(pair.incident, pair.outgoing).unwrap();
+            // Each component of the sum carries a rounding of 1e-16, which its division by
+            // |omega_i + omega_o| = 2 cos(theta_d) magnifies.
+            let tolerance = 4e-16 / angles.cos_theta_d();
+            prop_assert!((angles.theta_h().cos() - dot(h, NORMAL)).abs() <= tolerance);
+            prop_assert!((angles.cos_theta_h() - dot(h, NORMAL)).abs() <= tolerance);
+            prop_assert!((angles.theta_d().cos() - dot(h, pair.incident)).abs() <= tolerance);
+            prop_assert!((angles.cos_theta_d() - dot(h, pair.incident)).abs() <= tolerance);
+            prop_assert_eq!(pair.swapped().half_difference(), angles);
+        }
+
         #[test]
         fn mirroring_is_an_involution_and_keeps_length_and_angle_to_the_normal(
             theta in 0.0..FRAC_PI_2, phi in -PI..PI,

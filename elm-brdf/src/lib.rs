@@ -34,11 +34,14 @@ pub mod brdf;
 pub mod cli;
 mod error;
 pub mod features;
+#[cfg(feature = "fetch")]
+pub mod fetch;
 pub mod geometry;
 pub mod link;
 pub mod model;
 pub mod protocol;
 pub mod published;
+pub mod reference;
 pub mod report;
 
 pub use error::{Error, Result};

@@ -1,40 +1,364 @@
 //! Between a BRDF value and the number that the regression is asked to meet.
+//!
+//! The way back is the plain inverse, so that a model of the mean target gives a BRDF a little below
+//! its mean (Jensen's inequality). Measured on CUReT with a Gaussian process of the log, held out:
+//! multiplying by Duan's smearing factor (the mean exponential of leave-one-out residuals, JASA
+//! 78(383), 1983) or by $e^{s^2/2}$ changes the RMSE by 0.5 % at most, and a factor fitted to the
+//! leave-one-out predictions by least squares makes it worse; no correction is made.
+//!
+//! A [`Link`] is a setting. Fitted to the values of a training set it becomes a [`FittedLink`],
+//! which knows the scale of each channel and belongs to the model.
+//!
+//! ```
+//! use elm_brdf::link::Link;
+//! use ndarray::array;
+//!
+//! let values = array![[0.0], [0.2], [40.0]];
+//! let link = Link::default_log().fit(values.view())?;
+//! let targets = link.to_targets(values.view())?;
+//! let back = link.to_values(targets)?;
+//! assert!((&back - &values).iter().all(|error| error.abs() < 1e-12));
+//! # Ok::<(), elm_brdf::Error>(())
+//! ```
 
-use ndarray::Array2;
+use std::fmt;
+use std::str::FromStr;
+
+use ndarray::{Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
-/// The regression target made of a BRDF value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+use crate::error::{Error, Result};
+
+/// The regression target made of a BRDF value $f$.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Link {
     /// The value itself, as in the paper; predictions may be negative.
     #[default]
     Identity,
+    /// $\ln(1 + f/o)$, so that errors count relative to the value where it is far above $o$, and
+    /// as they are where it is far below.
+    Log {
+        /// $o$ as a fraction of the median of the channel's positive training values; positive
+        /// and finite.
+        offset: f64,
+    },
+    /// $f^{1/3}$: between the two, and without a scale.
+    CubeRoot,
 }
 
 impl Link {
+    /// The names that [`FromStr`] reads.
+    pub const NAMES: [&'static str; 3] = ["identity", "log", "cube-root"];
+
+    /// A [`FittedLink`] never returns more than this many times the largest value of its channel
+    /// in the training set (identity excepted): where a log target is extrapolated, a small error
+    /// of the target would else be a firefly, or infinite.
+    pub const HEADROOM: f64 = 10.0;
+
+    /// [`Link::Log`] with the offset at a tenth of the median.
+    #[must_use]
+    pub fn default_log() -> Self {
+        Self::Log { offset: 0.1 }
+    }
+
     /// The link's name.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Identity => "identity",
+            Self::Log { .. } => "log",
+            Self::CubeRoot => "cube-root",
         }
     }
 
-    /// Targets for BRDF values in 1/sr.
-    #[must_use]
-    pub fn to_targets(self, values: Array2<f64>) -> Array2<f64> {
+    /// Measures the scale of each channel of `values`, BRDF in 1/sr of shape (pairs, channels).
+    ///
+    /// # Errors
+    /// [`elm::Error::Parameter`] for an offset that is not positive and finite.
+    pub fn fit(self, values: ArrayView2<'_, f64>) -> Result<FittedLink> {
+        if let Self::Log { offset } = self
+            && !(offset > 0.0 && offset.is_finite())
+        {
+            return Err(Error::Elm(elm::Error::Parameter {
+                name: "offset of the log link",
+                value: offset,
+                expected: "positive and finite",
+            }));
+        }
+        let channels = values.columns().into_iter();
+        Ok(FittedLink {
+            channels: channels.map(|values| self.channel(values)).collect(),
+        })
+    }
+
+    fn channel(self, values: ArrayView1<'_, f64>) -> Channel {
+        let largest = values.iter().copied().fold(0.0, f64::max);
+        let ceiling = (largest * Self::HEADROOM).min(f64::MAX);
         match self {
-            Self::Identity => values,
+            Self::Identity => Channel::Identity,
+            Self::CubeRoot => Channel::CubeRoot { ceiling },
+            Self::Log { offset } => {
+                let fraction = offset;
+                let offset = fraction * median_of_positive(values).unwrap_or(1.0);
+                Channel::Log {
+                    // Dividing by a subnormal could overflow.
+                    offset: offset.clamp(f64::MIN_POSITIVE, f64::MAX),
+                    ceiling,
+                }
+            }
+        }
+    }
+}
+
+fn median_of_positive(values: ArrayView1<'_, f64>) -> Option<f64> {
+    let mut positive: Vec<f64> = values.iter().copied().filter(|&v| v > 0.0).collect();
+    let middle = positive.len() / 2;
+    (!positive.is_empty()).then(|| *positive.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+impl fmt::Display for Link {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Link {
+    type Err = Error;
+
+    /// The link of this name, with its default offset.
+    fn from_str(name: &str) -> Result<Self> {
+        match name {
+            "identity" => Ok(Self::Identity),
+            "log" => Ok(Self::default_log()),
+            "cube-root" => Ok(Self::CubeRoot),
+            _ => Err(Error::UnknownName {
+                what: "link",
+                name: name.to_owned(),
+                expected: Self::NAMES.join(", "),
+            }),
+        }
+    }
+}
+
+/// A [`Link`] that knows the scale of each channel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FittedLink {
+    channels: Vec<Channel>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Channel {
+    Identity,
+    Log {
+        /// In 1/sr.
+        offset: f64,
+        /// The largest value ever returned, in 1/sr.
+        ceiling: f64,
+    },
+    CubeRoot {
+        /// The largest value ever returned, in 1/sr.
+        ceiling: f64,
+    },
+}
+
+impl Channel {
+    fn target(self, value: f64) -> f64 {
+        match self {
+            Self::Identity => value,
+            // The quotient is finite unless the value is beyond 1e300 offsets.
+            Self::Log { offset, .. } => (value.max(0.0) / offset).min(f64::MAX).ln_1p(),
+            Self::CubeRoot { .. } => value.cbrt(),
         }
     }
 
-    /// BRDF values in 1/sr for predicted targets.
-    #[must_use]
-    pub fn to_values(self, targets: Array2<f64>) -> Array2<f64> {
+    fn value(self, target: f64) -> f64 {
+        let bounded = |value: f64, ceiling: f64| {
+            if value.is_nan() {
+                value
+            } else {
+                value.clamp(0.0, ceiling)
+            }
+        };
         match self {
-            Self::Identity => targets,
+            Self::Identity => target,
+            Self::Log { offset, ceiling } => bounded(offset * target.exp_m1(), ceiling),
+            Self::CubeRoot { ceiling } => bounded(target.powi(3), ceiling),
+        }
+    }
+}
+
+impl FittedLink {
+    /// Number of channels.
+    #[must_use]
+    pub fn channels(&self) -> usize {
+        self.channels.len()
+    }
+
+    /// Numbers kept for each channel.
+    pub(crate) fn floats_per_channel(&self) -> usize {
+        match self.channels.first() {
+            None | Some(Channel::Identity) => 0,
+            Some(Channel::CubeRoot { .. }) => 1,
+            Some(Channel::Log { .. }) => 2,
+        }
+    }
+
+    /// Targets for BRDF values in 1/sr, shape (pairs, channels).
+    ///
+    /// The log of a negative value is taken as that of 0.
+    ///
+    /// # Errors
+    /// [`elm::Error::Shape`] for another number of channels than the link was fitted to.
+    pub fn to_targets(&self, values: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
+        self.map(values.to_owned(), Channel::target)
+    }
+
+    /// BRDF values in 1/sr for predicted targets, shape (pairs, channels).
+    ///
+    /// Unless the link is the identity they are not negative and at most [`Link::HEADROOM`] times
+    /// the largest value that the link was fitted to. A target that is NaN stays NaN.
+    ///
+    /// # Errors
+    /// [`elm::Error::Shape`] for another number of channels than the link was fitted to.
+    pub fn to_values(&self, targets: Array2<f64>) -> Result<Array2<f64>> {
+        self.map(targets, Channel::value)
+    }
+
+    fn map(&self, mut matrix: Array2<f64>, f: fn(Channel, f64) -> f64) -> Result<Array2<f64>> {
+        if matrix.ncols() != self.channels.len() {
+            return Err(Error::Elm(elm::Error::Shape {
+                what: "channels of the link",
+                expected: self.channels.len(),
+                found: matrix.ncols(),
+            }));
+        }
+        for (mut column, &channel) in matrix.columns_mut().into_iter().zip(&self.channels) {
+            column.mapv_inplace(|entry| f(channel, entry));
+        }
+        Ok(matrix)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::{assert_abs_diff_eq, assert_relative_eq};
+    use ndarray::array;
+    use proptest::prelude::*;
+
+    const LINKS: [Link; 3] = [Link::Identity, Link::Log { offset: 0.5 }, Link::CubeRoot];
+
+    #[test]
+    fn targets_at_hand_computed_values() {
+        // Medians 2 (of 1, 2, 4; the 0 does not count) and 20.
+        let values = array![
+            [0.0, 10.0],
+            [1.0, 10.0],
+            [2.0, 20.0],
+            [4.0, 40.0],
+            [0.0, 40.0]
+        ];
+        let log = Link::Log { offset: 0.5 }.fit(values.view()).unwrap();
+        let targets = log.to_targets(values.view()).unwrap();
+        assert_abs_diff_eq!(
+            targets.column(0),
+            array![0.0, 2.0_f64.ln(), 3.0_f64.ln(), 5.0_f64.ln(), 0.0].view(),
+            epsilon = 1e-15
+        );
+        assert_abs_diff_eq!(targets[[3, 1]], 5.0_f64.ln(), epsilon = 1e-15);
+
+        let cube = Link::CubeRoot.fit(values.view()).unwrap();
+        let targets = cube.to_targets(array![[8.0, 0.027]].view()).unwrap();
+        assert_abs_diff_eq!(targets, array![[2.0, 0.3]], epsilon = 1e-15);
+    }
+
+    #[test]
+    fn no_target_gives_a_negative_or_unbounded_value() {
+        let values = array![[0.0], [1.0], [3.0]];
+        for link in [Link::default_log(), Link::CubeRoot] {
+            let fitted = link.fit(values.view()).unwrap();
+            let targets = array![[-1e300], [-1.0], [0.0], [1e9], [f64::INFINITY]];
+            let back = fitted.to_values(targets).unwrap();
+            assert_eq!(back, array![[0.0], [0.0], [0.0], [30.0], [30.0]], "{link}");
+        }
+    }
+
+    #[test]
+    fn an_all_black_channel_stays_black() {
+        let values = Array2::zeros((4, 1));
+        for link in LINKS {
+            let fitted = link.fit(values.view()).unwrap();
+            let targets = fitted.to_targets(values.view()).unwrap();
+            assert_eq!(fitted.to_values(targets).unwrap(), values, "{link}");
+        }
+    }
+
+    #[test]
+    fn the_log_resolves_a_metallic_paint_from_one_in_a_hundred_thousand_to_six_hundred() {
+        // Nine of ten values at 0.05 as a paint has, then extremes.
+        let mut values = Array2::from_elem((40, 1), 0.05);
+        values[[0, 0]] = 1e-5;
+        values[[1, 0]] = 600.0;
+        let fitted = Link::default_log().fit(values.view()).unwrap();
+        let targets = fitted.to_targets(values.view()).unwrap();
+        let back = fitted.to_values(targets.clone()).unwrap();
+        for (&value, &back) in values.iter().zip(&back) {
+            // A relative rounding of the target t = ln(1 + f/o) moves f by t (f + o) / f of
+            // them: 1 where f is far below o, and t <= ln(600 / 0.005) = 11.7 far above.
+            assert_relative_eq!(value, back, max_relative = 12.0 * f64::EPSILON);
+        }
+        // Errors of the target are relative errors of the large value.
+        let moved = fitted.to_values(targets + 1e-3).unwrap();
+        assert_relative_eq!(moved[[1, 0]] / 600.0, 1e-3_f64.exp(), max_relative = 1e-5);
+    }
+
+    #[test]
+    fn wrong_settings_and_shapes_are_refused() {
+        let values = array![[1.0, 2.0]];
+        for offset in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(Link::Log { offset }.fit(values.view()).is_err());
+        }
+        let fitted = Link::CubeRoot.fit(values.view()).unwrap();
+        assert!(fitted.to_targets(array![[1.0]].view()).is_err());
+        assert!(fitted.to_values(array![[1.0]]).is_err());
+    }
+
+    #[test]
+    fn names_are_read_back() {
+        for name in Link::NAMES {
+            assert_eq!(name.parse::<Link>().unwrap().name(), name);
+        }
+        assert!("square".parse::<Link>().is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn values_survive_the_way_there_and_back(
+            values in proptest::collection::vec(
+                prop_oneof![Just(0.0), 1e-6..1.0_f64, 1.0..1e4_f64], 1..30),
+        ) {
+            let values = Array2::from_shape_vec((values.len(), 1), values).unwrap();
+            for link in LINKS {
+                let fitted = link.fit(values.view()).unwrap();
+                let back = fitted.to_values(fitted.to_targets(values.view()).unwrap()).unwrap();
+                for (&value, &back) in values.iter().zip(&back) {
+                    // ln(1 + f/o) stays below 25 here: so many roundings of the target.
+                    prop_assert!((value - back).abs() <= 30.0 * f64::EPSILON * value, "{}", link);
+                }
+            }
+        }
+
+        #[test]
+        fn links_are_monotonic(low in 0.0..10.0_f64, step in 1e-3..10.0_f64, median in 1e-3..1e3_f64) {
+            let fitted_to = array![[median]];
+            for link in LINKS {
+                let fitted = link.fit(fitted_to.view()).unwrap();
+                let targets = fitted.to_targets(array![[low], [low + step]].view()).unwrap();
+                prop_assert!(targets[[0, 0]] < targets[[1, 0]], "{}", link);
+            }
         }
     }
 }

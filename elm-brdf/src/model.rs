@@ -7,7 +7,7 @@ use crate::brdf::{Brdf, Fit};
 use crate::error::Result;
 use crate::features::Features;
 use crate::geometry::Pair;
-use crate::link::Link;
+use crate::link::{FittedLink, Link};
 
 /// What a [`BrdfModel`] is made of.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,7 +43,7 @@ pub struct BrdfParams {
 #[derive(Debug, Clone, PartialEq)]
 pub struct BrdfModel {
     features: Features,
-    link: Link,
+    link: FittedLink,
     network: Elm<f64>,
 }
 
@@ -58,11 +58,12 @@ impl BrdfModel {
 impl Fit for BrdfParams {
     fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
         let x = self.features.compute(pairs);
-        let t = self.link.to_targets(values.to_owned());
+        let link = self.link.fit(values)?;
+        let t = link.to_targets(values)?;
         let network = self.network.fit(&x, &t)?;
         Ok(Box::new(BrdfModel {
             features: self.features,
-            link: self.link,
+            link,
             network,
         }))
     }
@@ -75,6 +76,15 @@ impl Brdf for BrdfModel {
 
     fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
         let targets = self.network.predict(&self.features.compute(pairs))?;
-        Ok(self.link.to_values(targets))
+        self.link.to_values(targets)
+    }
+
+    fn floats_per_channel(&self) -> usize {
+        // The seed regenerates the hidden layer. Each input has a mean and a deviation.
+        let scaler = self
+            .network
+            .scaler()
+            .map_or(0, |scaler| 2 * scaler.mean().len());
+        self.network.beta().nrows() + 1 + scaler + self.link.floats_per_channel()
     }
 }

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use ::csv::{ErrorKind, Position, ReaderBuilder, StringRecord, Trim};
+use ::csv::{ErrorKind, Position, ReaderBuilder, StringRecord};
 use ndarray::{Array2, Axis};
 
 use crate::Error;
@@ -55,14 +55,15 @@ impl Table {
                 path: path.to_owned(),
                 reason,
             })?;
-        let source = Source {
-            path,
-            bytes: &bytes,
-        };
+        Self::parse(path, &bytes).map(|(table, _)| table)
+    }
+
+    /// The table, and the byte at which the record of each row begins, for [`line_of`].
+    pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<(Self, Vec<u64>), Error> {
+        let source = Source { path, bytes };
         // The header is read as a row, so that its place is known.
         let mut reader = ReaderBuilder::new()
             .has_headers(false)
-            .trim(Trim::All)
             .from_reader(source.bytes);
         let mut record = StringRecord::new();
         let mut next = |record: &mut StringRecord| {
@@ -77,9 +78,11 @@ impl Table {
             });
         }
         let columns = header(source, &record)?;
-        let mut cells = Vec::new();
+        let (mut cells, mut begins) = (Vec::new(), Vec::new());
         while next(&mut record)? {
-            for (cell, column) in record.iter().zip(&columns) {
+            begins.push(record.position().map_or(0, Position::byte));
+            // The reader's own trimming would make a copy of every record.
+            for (cell, column) in record.iter().map(str::trim).zip(&columns) {
                 cells.push(number(cell).ok_or_else(|| Error::NotANumber {
                     path: path.to_owned(),
                     line: source.line(record.position()),
@@ -90,7 +93,7 @@ impl Table {
         }
         let rows = cells.len() / columns.len();
         match Array2::from_shape_vec((rows, columns.len()), cells) {
-            Ok(values) if rows > 0 => Ok(Self { columns, values }),
+            Ok(values) if rows > 0 => Ok((Self { columns, values }, begins)),
             _ => Err(Error::EmptyTable {
                 path: path.to_owned(),
                 found: "only a header",
@@ -151,24 +154,8 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// The line on which a record begins, counted from 1; 0 if unknown.
-    ///
-    /// The reader's own count lags: it takes the rest of a CRLF and blank lines for the beginning
-    /// of the record that follows.
     fn line(self, position: Option<&Position>) -> usize {
-        let Some(byte) = position.and_then(|position| usize::try_from(position.byte()).ok()) else {
-            return 0;
-        };
-        let after = self.bytes.iter().skip(byte);
-        let blank = after
-            .take_while(|byte| matches!(byte, b'\r' | b'\n'))
-            .count();
-        self.bytes
-            .iter()
-            .take(byte + blank)
-            .filter(|&&byte| byte == b'\n')
-            .count()
-            + 1
+        position.map_or(0, |position| line_of(self.bytes, position.byte()))
     }
 
     fn error(self, error: ::csv::Error) -> Error {
@@ -192,14 +179,31 @@ impl Source<'_> {
     }
 }
 
+/// The line on which the record that begins at `byte` stands, counted from 1; 0 if unknown.
+///
+/// The reader's own count lags: it takes the rest of a CRLF and blank lines for the beginning of
+/// the record that follows.
+pub(crate) fn line_of(bytes: &[u8], byte: u64) -> usize {
+    let Ok(byte) = usize::try_from(byte) else {
+        return 0;
+    };
+    let after = bytes.iter().skip(byte);
+    let blank = after
+        .take_while(|byte| matches!(byte, b'\r' | b'\n'))
+        .count();
+    let before = bytes.iter().take(byte + blank);
+    before.filter(|&&byte| byte == b'\n').count() + 1
+}
+
 /// The names of the columns, once they are seen to name them.
 fn header(source: Source<'_>, record: &StringRecord) -> Result<Vec<String>, Error> {
+    let names = || record.iter().map(str::trim);
     let (path, line) = (|| source.path.to_owned(), source.line(record.position()));
-    if record.iter().all(|name| name.parse::<f64>().is_ok()) {
+    if names().all(|name| name.parse::<f64>().is_ok()) {
         return Err(Error::NoHeader { path: path(), line });
     }
     let mut seen = HashSet::new();
-    for (index, name) in record.iter().enumerate() {
+    for (index, name) in names().enumerate() {
         if name.is_empty() {
             return Err(Error::UnnamedColumn {
                 path: path(),
@@ -215,7 +219,7 @@ fn header(source: Source<'_>, record: &StringRecord) -> Result<Vec<String>, Erro
             });
         }
     }
-    Ok(record.iter().map(str::to_owned).collect())
+    Ok(names().map(str::to_owned).collect())
 }
 
 fn number(cell: &str) -> Option<f64> {

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use crate::{merl, pbrt, rgl, scattered};
+
 /// What a numbered line of a CUReT file describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -36,6 +38,18 @@ pub enum Error {
         path: PathBuf,
         /// What the operating system said.
         reason: std::io::Error,
+    },
+    /// A file too large to be what it should be.
+    #[error(
+        "{}: expected at most {} bytes, found {found}",
+        path.display(),
+        crate::file::MOST
+    )]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its length in bytes.
+        found: u64,
     },
     /// A file could not be written or moved into place.
     #[error("cannot write {}: {reason}", path.display())]
@@ -269,6 +283,64 @@ pub enum Error {
         targets: usize,
         /// Columns of the table.
         columns: usize,
+    },
+    /// A table of scattered samples that is none.
+    #[error("{}, line {line}: {problem}", path.display())]
+    Scattered {
+        /// The file, or the name given to the stream.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: usize,
+        /// What is wrong there.
+        problem: scattered::Problem,
+    },
+    /// A file that is no MERL table.
+    #[error("{}: {problem}", path.display())]
+    Merl {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: merl::Problem,
+    },
+    /// A file that is no isotropic material of the RGL database.
+    #[error("{}: {problem}", path.display())]
+    Rgl {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: rgl::Problem,
+    },
+    /// A file that is no list of samples for pbrt-v2.
+    #[error("{}, line {line}: {problem}", path.display())]
+    Pbrt {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1; 0 if there is none.
+        line: usize,
+        /// What is wrong there.
+        problem: pbrt::Problem,
+    },
+    /// A file of no format that is known.
+    #[error(
+        "{}: expected scattered samples (.csv), a MERL table (.binary), a material of RGL (.bsdf) \
+         or samples for pbrt-v2 (.brdf); found neither such a file nor such a name",
+        path.display()
+    )]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A text that names no format.
+    #[error("{text:?} is no file format: expected csv, merl, rgl or pbrt")]
+    UnknownFormatName {
+        /// The text.
+        text: String,
+    },
+    /// A file without a row that can be used.
+    #[error("{}: expected at least one measurement, found none that is valid", path.display())]
+    NothingMeasured {
+        /// The file.
+        path: PathBuf,
     },
     /// No rows asked for, or too many.
     #[error("expected 1 to {last} rows, found {found}")]

@@ -4,6 +4,8 @@
 //!   database itself is not part of the crate.
 //! - [`synthetic`] makes a set of the same shape from formulas, the [`analytic`] models. Both give
 //!   [`Measurements`], so that whatever works on one works on the other.
+//! - [`open()`] reads [`Samples`] of one material from a file of any format: one's own as CSV
+//!   ([`scattered`]), the [`merl`] and [`rgl`] databases, and [`pbrt`]-v2.
 //! - [`csv`] reads tables of one's own; [`toy`] makes regression problems with known answers.
 //!
 //! Directions are polar angles in radians in the frame of the surface, values are BRDF in 1/sr
@@ -36,12 +38,22 @@ pub mod analytic;
 pub mod csv;
 pub mod curet;
 pub mod error;
+mod file;
 pub mod measurements;
+pub mod merl;
+mod open;
+pub mod pbrt;
+pub mod rgl;
 pub mod samples;
+pub mod sampling;
+pub mod scattered;
 pub mod synthetic;
 pub mod toy;
+mod vector;
 
 pub use curet::MaterialId;
 pub use error::Error;
 pub use measurements::{Invalid, Material, Measurements, Origin};
+pub use open::{Format, OpenOptions, Opened, open};
 pub use samples::{Directions, Samples};
+pub use sampling::Sampling;

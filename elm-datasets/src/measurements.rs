@@ -36,6 +36,25 @@ impl Invalid {
             Self::Drop => "drop",
         }
     }
+
+    /// Treats the negative values among `values`, shape (rows, channels): the rows that are left,
+    /// their values, and how many were negative.
+    pub(crate) fn treat(self, mut values: Array2<f64>) -> (Vec<usize>, Array2<f64>, usize) {
+        let invalid = values.iter().filter(|&&value| value < 0.0).count();
+        let mut rows: Vec<usize> = (0..values.nrows()).collect();
+        match self {
+            Self::Keep => {}
+            // `<=`, so that a printed -0.000 loses its sign too.
+            Self::Clamp => {
+                values.mapv_inplace(|value| if value <= 0.0 { 0.0 } else { value });
+            }
+            Self::Drop => {
+                rows.retain(|&row| values.row(row).iter().all(|&value| value >= 0.0));
+                values = values.select(ndarray::Axis(0), &rows);
+            }
+        }
+        (rows, values, invalid)
+    }
 }
 
 impl fmt::Display for Invalid {
@@ -115,20 +134,8 @@ pub struct Material {
 
 impl Material {
     /// Treats the negative values among `values`, shape (directions, channels).
-    pub(crate) fn new(id: MaterialId, name: &str, mut values: Array2<f64>, way: Invalid) -> Self {
-        let invalid = values.iter().filter(|&&value| value < 0.0).count();
-        let mut rows: Vec<usize> = (0..values.nrows()).collect();
-        match way {
-            Invalid::Keep => {}
-            // `<=`, so that a printed -0.000 loses its sign too.
-            Invalid::Clamp => {
-                values.mapv_inplace(|value| if value <= 0.0 { 0.0 } else { value });
-            }
-            Invalid::Drop => {
-                rows.retain(|&row| values.row(row).iter().all(|&value| value >= 0.0));
-                values = values.select(ndarray::Axis(0), &rows);
-            }
-        }
+    pub(crate) fn new(id: MaterialId, name: &str, values: Array2<f64>, way: Invalid) -> Self {
+        let (rows, values, invalid) = way.treat(values);
         Self {
             id,
             name: name.to_owned(),

@@ -43,21 +43,11 @@ proptest! {
 
     #[test]
     fn mutations_of_a_valid_file_are_no_reason_to_panic(
-        changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0..3u8), 1..8),
+        changes in support::changes(),
         file in prop::sample::select(vec!["table.txt", "rbrdf.dat", "bbrdf.dat"]),
     ) {
         let dir = stand_in();
-        change(dir.path(), file, |mut bytes| {
-            for (place, byte, kind) in changes {
-                let place = place.index(bytes.len());
-                match kind {
-                    0 => bytes[place] = byte,
-                    1 => bytes.insert(place, byte),
-                    _ => { bytes.remove(place); }
-                }
-            }
-            bytes
-        });
+        change(dir.path(), file, |bytes| support::mutate(bytes, changes));
         check(dir.path());
     }
 

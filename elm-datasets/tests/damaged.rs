@@ -88,6 +88,26 @@ fn damage_is_reported_with_file_line_and_expectation() {
 }
 
 #[test]
+fn single_files_are_checked_as_a_folder_is() {
+    let dir = stand_in();
+    for (what, file, edit, fragments) in DAMAGE {
+        let whole = fs::read(dir.path().join(file)).unwrap();
+        let check = |bytes: &[u8]| match *file {
+            curet::TABLE => curet::check_table(bytes, file),
+            _ => curet::check_values(bytes, file),
+        };
+        check(&whole).unwrap();
+        let message = check(&edit_lines(whole, edit, "\n"))
+            .unwrap_err()
+            .to_string();
+        for fragment in fragments.iter().chain([file]) {
+            assert!(message.contains(fragment), "{what}: {message}");
+        }
+    }
+    assert_eq!(curet::VALUES.len(), 4);
+}
+
+#[test]
 fn bytes_that_are_not_text_are_reported_with_their_line() {
     for (file, line, at) in [("rbrdf.dat", 3, 20), ("table.txt", 2, 0)] {
         let dir = stand_in();

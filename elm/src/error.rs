@@ -77,6 +77,18 @@ pub enum Error {
         /// The other setting.
         second: &'static str,
     },
+    /// The rows outside a fold do not have a unique answer to the rows in it.
+    #[error("the rows outside fold {fold} do not determine a prediction for those in it")]
+    Undetermined {
+        /// The fold's label; for leave-one-out the row, counted from 0.
+        fold: usize,
+    },
+    /// Two accumulators that are to be merged are not of one kind.
+    #[error("the accumulators have different {what}")]
+    Mismatch {
+        /// What differs.
+        what: &'static str,
+    },
     /// A factorisation did not converge.
     #[error("{what} did not converge")]
     NoConvergence {
@@ -88,6 +100,16 @@ pub enum Error {
     Overflow {
         /// Which result.
         what: &'static str,
+    },
+    /// An array would be larger than memory.
+    #[error("{what} would be {rows} x {columns}, more than memory holds")]
+    TooLarge {
+        /// Which array.
+        what: &'static str,
+        /// Its rows.
+        rows: usize,
+        /// Its columns.
+        columns: usize,
     },
     /// A name that is not one of those known.
     #[error("unknown {what} '{name}' (expected one of: {expected})")]

@@ -3,10 +3,10 @@
 //!
 //! That matrix is the paper's $F$; most of the literature, and this crate, call it $H$.
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, s};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
 use ndarray_rand::RandomExt;
 use ndarray_rand::rand_distr::{StandardNormal, StandardUniform};
-use rand::SeedableRng;
+use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
@@ -36,6 +36,35 @@ impl Distribution {
     }
 }
 
+/// Where the biases of the random layer come from.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Biases {
+    /// Drawn as the weights are, and multiplied by the same scale.
+    #[default]
+    AsWeights,
+    /// Drawn as the weights are, and multiplied by a scale of their own.
+    Scaled(f64),
+    /// Chosen so that each neuron's weighted sum is 0 at a training row drawn for it: the bend or
+    /// bump of every neuron then lies where there are data, whatever the scale of the weights.
+    OnData,
+}
+
+/// How a layer is drawn.
+#[derive(Debug, Clone)]
+pub(crate) struct Plan<A: Scalar> {
+    pub(crate) neurons: usize,
+    pub(crate) activation: Activation<A>,
+    pub(crate) distribution: Distribution,
+    /// Multiplies all weights.
+    pub(crate) scale: f64,
+    /// Multiplies the weights of each input; 1 for an input that is not listed.
+    pub(crate) input_scales: Vec<f64>,
+    pub(crate) biases: Biases,
+    pub(crate) seed: u64,
+}
+
 /// The random hidden layer of a network: it is drawn, never trained.
 ///
 /// One seed gives one layer on every platform: ChaCha8, drawn in `f64` and then rounded to `A`,
@@ -51,35 +80,38 @@ pub struct HiddenLayer<A: Scalar> {
 }
 
 impl<A: Scalar> HiddenLayer<A> {
-    /// Draws a layer. Weights are multiplied by `scale`, biases by `bias_scale`.
-    pub(crate) fn draw(
-        inputs: usize,
-        neurons: usize,
-        distribution: Distribution,
-        scale: f64,
-        bias_scale: f64,
-        activation: Activation<A>,
-        seed: u64,
-    ) -> Self {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let shape = (neurons, inputs + 1);
-        let draws: Array2<f64> = match distribution {
-            Distribution::Uniform => Array2::random_using(shape, StandardUniform, &mut rng)
+    /// Draws a layer for these (standardised) training rows.
+    pub(crate) fn draw(x: ArrayView2<'_, A>, plan: &Plan<A>) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(plan.seed);
+        let shape = (plan.neurons, x.ncols() + 1);
+        let draws: Array2<f64> = match plan.distribution {
+            Distribution::Uniform => Array2::random_using(shape, StandardUniform, &mut random)
                 .mapv_into(|unit: f64| 2.0 * unit - 1.0),
-            Distribution::Normal => Array2::random_using(shape, StandardNormal, &mut rng),
+            Distribution::Normal => Array2::random_using(shape, StandardNormal, &mut random),
         };
-        let weights = draws
-            .slice(s![.., ..inputs])
-            .t()
-            .mapv(|w| A::from_f64(w * scale));
-        let biases = draws
-            .index_axis(Axis(1), inputs)
-            .mapv(|b| A::from_f64(b * bias_scale));
-        // The transpose above is laid out by columns; rows are what the product reads.
+        let input_scale = |input: usize| plan.input_scales.get(input).copied().unwrap_or(1.0);
+        // Laid out by rows, as the product reads it.
+        let weights = Array2::from_shape_fn((x.ncols(), plan.neurons), |(input, neuron)| {
+            A::from_f64(draws[[neuron, input]] * plan.scale * input_scale(input))
+        });
+        let drawn = |scale: f64| draws.column(x.ncols()).mapv(|b| A::from_f64(b * scale));
+        let biases = match plan.biases {
+            Biases::AsWeights => drawn(plan.scale),
+            Biases::Scaled(scale) => drawn(scale),
+            Biases::OnData => {
+                // A stream of its own: the weights are those of the other choices.
+                random.set_stream(2);
+                let rows = weights.columns().into_iter().map(|column| {
+                    let row = random.random_range(0..x.nrows().max(1));
+                    -column.dot(&x.row(row))
+                });
+                rows.collect()
+            }
+        };
         Self {
-            weights: weights.as_standard_layout().into_owned(),
+            weights,
             biases,
-            activation,
+            activation: plan.activation.clone(),
         }
     }
 
@@ -125,17 +157,22 @@ impl<A: Scalar> HiddenLayer<A> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ndarray::{array, s};
+
+    fn plan<A: Scalar>(neurons: usize, seed: u64) -> Plan<A> {
+        Plan {
+            neurons,
+            activation: Activation::Tanh,
+            distribution: Distribution::Uniform,
+            scale: 1.0,
+            input_scales: Vec::new(),
+            biases: Biases::AsWeights,
+            seed,
+        }
+    }
 
     fn draw(neurons: usize, seed: u64) -> HiddenLayer<f64> {
-        HiddenLayer::draw(
-            3,
-            neurons,
-            Distribution::Uniform,
-            1.0,
-            1.0,
-            Activation::Tanh,
-            seed,
-        )
+        HiddenLayer::draw(array![[0.5, -1.0, 2.0]].view(), &plan(neurons, seed))
     }
 
     #[test]
@@ -163,11 +200,52 @@ mod tests {
 
     #[test]
     fn f32_is_the_rounded_f64_layer() {
-        let single: HiddenLayer<f32> =
-            HiddenLayer::draw(3, 5, Distribution::Normal, 0.3, 1.0, Activation::Tanh, 9);
-        let double: HiddenLayer<f64> =
-            HiddenLayer::draw(3, 5, Distribution::Normal, 0.3, 1.0, Activation::Tanh, 9);
+        let normal = |biases| (Distribution::Normal, 0.3, biases);
+        let (distribution, scale, biases) = normal(Biases::Scaled(2.0));
+        let single = Plan::<f32> {
+            distribution,
+            scale,
+            biases,
+            ..plan(5, 9)
+        };
+        let double = Plan::<f64> {
+            distribution,
+            scale,
+            biases,
+            ..plan(5, 9)
+        };
+        let single = HiddenLayer::draw(array![[0.0_f32, 1.0]].view(), &single);
+        let double = HiddenLayer::draw(array![[0.0, 1.0]].view(), &double);
         assert_eq!(single.weights, double.weights.mapv(|w| w as f32));
+        assert_eq!(single.biases, double.biases.mapv(|b| b as f32));
+    }
+
+    #[test]
+    fn biases_on_data_put_every_neuron_at_a_row() {
+        let x = array![[0.5, -1.0], [3.0, 0.25], [-2.0, 8.0]];
+        let plan = Plan {
+            biases: Biases::OnData,
+            scale: 50.0,
+            ..plan(20, 4)
+        };
+        let layer = HiddenLayer::draw(x.view(), &plan);
+        let z = x.dot(&layer.weights) + &layer.biases;
+        for column in z.columns() {
+            assert!(column.iter().any(|z: &f64| z.abs() < 1e-12), "{column}");
+        }
+    }
+
+    #[test]
+    fn input_scales_multiply_the_weights_of_their_input() {
+        let x = array![[0.5, -1.0]];
+        let scaled = Plan {
+            input_scales: vec![1.0, 0.0],
+            ..plan(3, 1)
+        };
+        let layer = HiddenLayer::draw(x.view(), &scaled);
+        let whole = HiddenLayer::draw(x.view(), &plan(3, 1));
+        assert_eq!(layer.weights.row(0), whole.weights.row(0));
+        assert_eq!(layer.weights.row(1).sum(), 0.0);
     }
 
     #[test]

@@ -23,6 +23,8 @@
 //! - [`Activation`] is the neurons' function, one of eight or your own.
 //! - [`solve`] has the solvers: equations 10 and 11 of the ELM literature, and ridge regression
 //!   with its strength chosen by exact leave-one-out, which is the default.
+//! - [`validate`] has held-out predictions in closed form, leave-one-out and k-fold.
+//! - [`Accumulator`] fits to rows that arrive in pieces.
 //! - [`metrics`] has RMSE, MAE and correlation.
 //!
 //! Everything is generic over [`Scalar`], `f32` or `f64`. No input makes the public API panic:
@@ -35,25 +37,34 @@
 //!
 //! # Features
 //! - `faer` (default): linear algebra in pure Rust.
-//! - `openblas-system`: LAPACK from the system's OpenBLAS, in place of faer.
+//! - `openblas-system`: LAPACK from the system's OpenBLAS, in place of faer. OpenBLAS is set to one
+//!   thread for the whole process: its parallel routines overflow the stack of a Rust thread.
 
+pub mod accumulate;
 pub mod activation;
 mod error;
 mod hidden;
 mod linalg;
 pub mod metrics;
 mod model;
+pub mod persist;
 mod predictor;
 mod scalar;
 mod scaler;
 mod simd;
 pub mod solve;
+pub mod tune;
+pub mod uncertainty;
+pub mod validate;
 
+pub use accumulate::Accumulator;
 pub use activation::{Accuracy, Activation};
 pub use error::{Error, Result};
-pub use hidden::{Distribution, HiddenLayer};
+pub use hidden::{Biases, Distribution, HiddenLayer};
 pub use linalg::backend;
 pub use model::{CheckedParams, Elm, ElmParams, Targets};
 pub use predictor::{Predictor, Scratch};
 pub use scalar::Scalar;
 pub use scaler::Scaler;
+pub use tune::Tuner;
+pub use uncertainty::UncertainElm;

@@ -1,6 +1,6 @@
 //! Measures of error between a prediction and the truth.
 
-use ndarray::ArrayRef1;
+use ndarray::{ArrayRef1, ArrayView1};
 
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
@@ -11,10 +11,8 @@ use crate::scalar::Scalar;
 /// [`Error::Shape`] when the lengths differ, [`Error::Empty`] when there is nothing to compare.
 pub fn rmse<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<f64> {
     check(predicted, truth)?;
-    let squares = pairs(predicted, truth)
-        .map(|(p, t)| (p - t).powi(2))
-        .sum::<f64>();
-    Ok((squares / truth.len() as f64).sqrt())
+    let errors: Vec<f64> = pairs(predicted, truth).map(|(p, t)| p - t).collect();
+    Ok(scaled_root_mean_square(errors.iter().map(|&e| (e, 1.0))))
 }
 
 /// Mean absolute error.
@@ -55,6 +53,34 @@ pub fn correlation<A: Scalar>(
         return Ok(None);
     }
     Ok(Some((pt / (pp.sqrt() * tt.sqrt())).clamp(-1.0, 1.0)))
+}
+
+/// Root of the weighted mean of squares; 0 of nothing.
+pub(crate) fn root_mean_square<A: Scalar>(
+    values: ArrayView1<'_, A>,
+    weights: ArrayView1<'_, A>,
+) -> f64 {
+    let pairs = values.iter().zip(weights);
+    scaled_root_mean_square(pairs.map(|(v, w)| (v.as_f64(), w.as_f64())))
+}
+
+/// Of values and weights. Scaled by the largest value, as squares of 1e200 are out of range.
+fn scaled_root_mean_square(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
+    let largest = pairs.clone().fold(0.0, |m: f64, (value, _)| {
+        // Unlike f64::max this keeps a NaN.
+        if m >= value.abs() || m.is_nan() {
+            m
+        } else {
+            value.abs()
+        }
+    });
+    if largest == 0.0 || !largest.is_finite() {
+        return largest;
+    }
+    let (squares, total) = pairs.fold((0.0, 0.0), |(squares, total), (value, weight)| {
+        (squares + weight * (value / largest).powi(2), total + weight)
+    });
+    largest * (squares / total).sqrt()
 }
 
 fn check<A>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<()> {
@@ -98,6 +124,20 @@ mod tests {
         // Deviations (-1.5, -0.5, 0.5, 1.5) and (-2, -3, 0, 5): 12 / sqrt(5 * 38).
         let r = correlation(&p, &t).unwrap().unwrap();
         approx::assert_relative_eq!(r, 12.0 / 190.0_f64.sqrt(), max_relative = 1e-15);
+    }
+
+    #[test]
+    fn squares_out_of_range_do_no_harm_and_nan_is_not_hidden() {
+        let zero = Array1::zeros(4);
+        for size in [1e-200, 1e200] {
+            let p = array![3.0, -4.0, 0.0, 0.0] * size;
+            approx::assert_relative_eq!(rmse(&p, &zero).unwrap(), 2.5 * size, max_relative = 1e-15);
+        }
+        for place in 0..4 {
+            let mut p = array![1.0, 2.0, 3.0, 4.0];
+            p[place] = f64::NAN;
+            assert!(rmse(&p, &zero).unwrap().is_nan());
+        }
     }
 
     #[test]

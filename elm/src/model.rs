@@ -5,11 +5,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::activation::Activation;
 use crate::error::{Error, Result};
-use crate::hidden::{Distribution, HiddenLayer};
+use crate::hidden::{Biases, Distribution, HiddenLayer, Plan};
 use crate::predictor::Predictor;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
-use crate::solve::{Diagnosis, LeastSquares, Solution, Solver, check_length, check_matrix};
+use crate::solve::{
+    Diagnosis, LeastSquares, Solution, Solver, check_length, check_matrix, check_room,
+};
+use crate::validate::{HeldOut, Validator};
 
 /// Settings of an extreme learning machine. Setters never fail; [`check`](Self::check) and
 /// [`fit`](Self::fit) say what is out of range.
@@ -22,7 +25,8 @@ use crate::solve::{Diagnosis, LeastSquares, Solution, Solver, check_length, chec
 /// | [`activation`](Self::activation) | sigmoid | the function $f$ of equation 7 | |
 /// | [`distribution`](Self::distribution) | uniform | what weights and biases are drawn from | |
 /// | [`scale`](Self::scale) | 1 | multiplies the random weights: how nonlinear the network is, and its most influential setting | positive |
-/// | [`bias_scale`](Self::bias_scale) | as `scale` | multiplies the random biases | not negative |
+/// | [`input_scales`](Self::input_scales) | none | multiply the weights of each input | one per input, not negative |
+/// | [`biases`](Self::biases) | drawn as the weights | where the biases come from | a scale must not be negative |
 /// | [`seed`](Self::seed) | 0 | which random layer | |
 /// | [`solver`](Self::solver) | ridge by leave-one-out | how output weights are found | |
 /// | [`intercept`](Self::intercept) | on, but off for `Inverse` | an unpenalised constant per output | |
@@ -49,7 +53,8 @@ pub struct ElmParams<A: Scalar> {
     activation: Activation<A>,
     distribution: Distribution,
     scale: f64,
-    bias_scale: Option<f64>,
+    input_scales: Vec<f64>,
+    biases: Biases,
     seed: u64,
     solver: Solver,
     intercept: Option<bool>,
@@ -66,13 +71,29 @@ impl<A: Scalar> ElmParams<A> {
             activation: Activation::default(),
             distribution: Distribution::default(),
             scale: 1.0,
-            bias_scale: None,
+            input_scales: Vec::new(),
+            biases: Biases::default(),
             seed: 0,
             solver: Solver::default(),
             intercept: None,
             standardise: true,
             direct_links: false,
         }
+    }
+
+    /// Another number of hidden neurons.
+    #[must_use]
+    pub fn with_neurons(mut self, neurons: usize) -> Self {
+        self.neurons = neurons;
+        self
+    }
+
+    pub(crate) fn neurons(&self) -> usize {
+        self.neurons
+    }
+
+    pub(crate) fn get_seed(&self) -> u64 {
+        self.seed
     }
 
     /// The activation function of the hidden neurons.
@@ -89,18 +110,25 @@ impl<A: Scalar> ElmParams<A> {
         self
     }
 
-    /// Multiplies the random weights, and the biases unless [`bias_scale`](Self::bias_scale) is
-    /// set.
+    /// Multiplies the random weights.
     #[must_use]
     pub fn scale(mut self, scale: f64) -> Self {
         self.scale = scale;
         self
     }
 
-    /// Multiplies the random biases.
+    /// Multiplies the weights of each input on top of [`scale`](Self::scale): 0 for an input that
+    /// is to be ignored. Empty, the default, means 1 for all.
     #[must_use]
-    pub fn bias_scale(mut self, bias_scale: f64) -> Self {
-        self.bias_scale = Some(bias_scale);
+    pub fn input_scales(mut self, input_scales: Vec<f64>) -> Self {
+        self.input_scales = input_scales;
+        self
+    }
+
+    /// Where the random biases come from.
+    #[must_use]
+    pub fn biases(mut self, biases: Biases) -> Self {
+        self.biases = biases;
         self
     }
 
@@ -160,13 +188,33 @@ impl<A: Scalar> ElmParams<A> {
         if !(self.scale > 0.0 && self.scale.is_finite()) {
             return parameter("scale", self.scale, "positive and finite");
         }
-        if let Some(value) = self.bias_scale
-            && !(value >= 0.0 && value.is_finite())
+        let not_negative = |value: f64| value >= 0.0 && value.is_finite();
+        if let Some(&value) = self
+            .input_scales
+            .iter()
+            .find(|value| !not_negative(**value))
         {
-            return parameter("bias_scale", value, "finite and not negative");
+            return parameter("input_scales", value, "finite and not negative");
+        }
+        if let Biases::Scaled(value) = self.biases
+            && !not_negative(value)
+        {
+            return parameter("biases", value, "finite and not negative");
         }
         self.solver.check()?;
         Ok(CheckedParams(self))
+    }
+
+    fn plan(&self) -> Plan<A> {
+        Plan {
+            neurons: self.neurons,
+            activation: self.activation.clone(),
+            distribution: self.distribution,
+            scale: self.scale,
+            input_scales: self.input_scales.clone(),
+            biases: self.biases,
+            seed: self.seed,
+        }
     }
 
     /// Checks the settings and fits; see [`CheckedParams::fit`].
@@ -188,8 +236,8 @@ impl<A: Scalar> CheckedParams<A> {
     /// `x` has shape (rows, inputs); `t` has shape (rows, outputs), or (rows) for one output.
     ///
     /// # Errors
-    /// [`Error::Empty`], [`Error::Shape`] and [`Error::NotFinite`] for the data, and those of
-    /// [`Solver::solve`].
+    /// [`Error::Empty`], [`Error::Shape`] and [`Error::NotFinite`] for the data,
+    /// [`Error::TooLarge`] for more neurons than memory holds, and those of [`Solver::solve`].
     pub fn fit<T: Targets<A>>(&self, x: &ArrayRef2<A>, t: &T) -> Result<Elm<A>> {
         self.fit_weighted(x, t, None)
     }
@@ -206,43 +254,136 @@ impl<A: Scalar> CheckedParams<A> {
         t: &T,
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<Elm<A>> {
+        let t = t.as_matrix();
+        let Drawn {
+            scaler,
+            hidden,
+            design,
+        } = self.draw(x.view(), t)?;
+        let solution = self
+            .0
+            .solver
+            .solve(&self.problem(&design, t, weights.as_ref())?)?;
+        Ok(Elm::assemble(scaler, hidden, self.0.direct_links, solution))
+    }
+
+    /// Held-out predictions for every row, from one random layer and one factorisation: `folds`
+    /// has one label per row, and rows of one label are predicted by the fit to all others.
+    ///
+    /// Ridge has the same strength in every fold, given or chosen on all rows, and inputs are
+    /// standardised on all rows; [`validate`](crate::validate) says what that leaks.
+    ///
+    /// # Errors
+    /// Those of [`fit`](Self::fit) for the data and of [`Validator::k_fold`];
+    /// [`Error::Conflict`] for [`Inverse`](crate::solve::Inverse), which cannot be fitted to fewer
+    /// rows, and for a pseudo-inverse with a cut-off of its own, which would fall elsewhere in
+    /// every fold.
+    pub fn cross_validate<T: Targets<A>>(
+        &self,
+        x: &ArrayRef2<A>,
+        t: &T,
+        folds: &[usize],
+    ) -> Result<HeldOut<A>> {
+        let t = t.as_matrix();
+        let conflict = |first| {
+            Err(Error::Conflict {
+                first,
+                second: "validation in closed form",
+            })
+        };
+        let ridge = match self.0.solver {
+            Solver::Inverse(_) => return conflict("the solver 'inverse'"),
+            Solver::PseudoInverse(solver) if solver.cutoff().is_some() => {
+                return conflict("a cut-off of the pseudo-inverse");
+            }
+            Solver::PseudoInverse(_) => None,
+            Solver::Ridge(ridge) => Some(ridge),
+        };
+        let validator = self.validator(x.view(), t)?;
+        let lambda = match ridge {
+            Some(ridge) => validator.strengths(ridge)?,
+            None => vec![0.0],
+        };
+        validator.k_fold(folds, &lambda)
+    }
+
+    /// Draws the layer, applies it, and factorises.
+    pub(crate) fn validator(
+        &self,
+        x: ArrayView2<'_, A>,
+        t: ArrayView2<'_, A>,
+    ) -> Result<Validator<A>> {
+        let design = self.draw(x, t)?.design;
+        Validator::new(&self.problem(&design, t, None)?)
+    }
+
+    /// Checks the data, draws the layer and applies it.
+    fn draw(&self, x: ArrayView2<'_, A>, t: ArrayView2<'_, A>) -> Result<Drawn<A>> {
         let params = &self.0;
-        let (x, t) = (x.view(), t.as_matrix());
         check_matrix("inputs", x)?;
         check_matrix("targets", t)?;
         check_length("rows of targets", t.nrows(), x.nrows())?;
 
+        // Asked before anything is drawn, as a failed allocation would abort the program.
+        check_room("the hidden-layer matrix", x.nrows(), params.neurons)?;
         let scaler = params.standardise.then(|| Scaler::measure(x));
-        let hidden = HiddenLayer::draw(
-            x.ncols(),
-            params.neurons,
-            params.distribution,
-            params.scale,
-            params.bias_scale.unwrap_or(params.scale),
-            params.activation.clone(),
-            params.seed,
-        );
-        let design = design(scaler.as_ref(), &hidden, params.direct_links, x);
-        // Equation 10 has no room for a constant; asking for both explicitly is an error.
-        let inverse = matches!(params.solver, Solver::Inverse(_));
-        let mut problem =
-            LeastSquares::new(&design, &t)?.intercept(params.intercept.unwrap_or(!inverse));
-        if let Some(weights) = &weights {
-            problem = problem.weights(weights)?;
-        }
-        let Solution {
-            beta,
-            intercept,
-            diagnosis,
-        } = params.solver.solve(&problem)?;
-        Ok(Elm {
+        let scaled = scaler.as_ref().map(|scaler| scaler.transform(x));
+        let x = scaled.as_ref().map_or(x, |scaled| scaled.view());
+        let hidden = self.layer(x)?;
+        let design = design(&hidden, params.direct_links, x);
+        Ok(Drawn {
             scaler,
             hidden,
-            direct_links: params.direct_links,
-            beta,
-            intercept,
-            diagnosis,
+            design,
         })
+    }
+
+    pub(crate) fn problem<'a>(
+        &self,
+        design: &'a Array2<A>,
+        t: ArrayView2<'a, A>,
+        weights: Option<&'a ArrayView1<'_, A>>,
+    ) -> Result<LeastSquares<'a, A>> {
+        let problem = LeastSquares::of_views(design.view(), t)?.intercept(self.has_intercept());
+        match weights {
+            Some(weights) => problem.weights(weights),
+            None => Ok(problem),
+        }
+    }
+
+    /// The random layer for these (standardised) rows, of which only
+    /// [`Biases::OnData`] uses more than the number of inputs.
+    pub(crate) fn layer(&self, x: ArrayView2<'_, A>) -> Result<HiddenLayer<A>> {
+        let params = &self.0;
+        // A failed allocation would abort the program.
+        let per_neuron = x.ncols().saturating_add(1);
+        check_room("the hidden layer", per_neuron, params.neurons)?;
+        if !params.input_scales.is_empty() {
+            check_length("input scales", params.input_scales.len(), x.ncols())?;
+        }
+        Ok(HiddenLayer::draw(x, &params.plan()))
+    }
+
+    pub(crate) fn biases(&self) -> Biases {
+        self.0.biases
+    }
+
+    /// Equation 10 has no room for a constant; asking for both explicitly is an error later.
+    pub(crate) fn has_intercept(&self) -> bool {
+        let inverse = matches!(self.0.solver, Solver::Inverse(_));
+        self.0.intercept.unwrap_or(!inverse)
+    }
+
+    pub(crate) fn standardises(&self) -> bool {
+        self.0.standardise
+    }
+
+    pub(crate) fn links_directly(&self) -> bool {
+        self.0.direct_links
+    }
+
+    pub(crate) fn solver(&self) -> Solver {
+        self.0.solver
     }
 
     /// The settings.
@@ -252,15 +393,19 @@ impl<A: Scalar> CheckedParams<A> {
     }
 }
 
-/// Standardise, project, activate, and append the inputs where they are linked directly.
-fn design<A: Scalar>(
-    scaler: Option<&Scaler<A>>,
+/// A random layer and what it makes of the training inputs.
+struct Drawn<A: Scalar> {
+    scaler: Option<Scaler<A>>,
+    hidden: HiddenLayer<A>,
+    design: Array2<A>,
+}
+
+/// Project, activate, and append the inputs where they are linked directly.
+pub(crate) fn design<A: Scalar>(
     hidden: &HiddenLayer<A>,
     direct_links: bool,
     x: ArrayView2<'_, A>,
 ) -> Array2<A> {
-    let scaled = scaler.map(|scaler| scaler.transform(x));
-    let x = scaled.as_ref().map_or(x, |scaled| scaled.view());
     let h = hidden.forward(x);
     if !direct_links {
         return h;
@@ -274,7 +419,7 @@ fn design<A: Scalar>(
 /// A fitted network: $o(x) = \sum_k \beta_k f(\omega_k \cdot x + b_k)$ (equation 7) plus, where
 /// set, an intercept and direct links. Made by [`ElmParams::fit`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[serde(bound = "", try_from = "Parts<A>")]
 pub struct Elm<A: Scalar> {
     scaler: Option<Scaler<A>>,
     hidden: HiddenLayer<A>,
@@ -285,7 +430,86 @@ pub struct Elm<A: Scalar> {
     diagnosis: Diagnosis,
 }
 
+/// An [`Elm`] as it comes from outside, before its parts are known to fit together.
+#[derive(Deserialize)]
+#[serde(bound = "")]
+struct Parts<A: Scalar> {
+    scaler: Option<Scaler<A>>,
+    hidden: HiddenLayer<A>,
+    direct_links: bool,
+    beta: Array2<A>,
+    intercept: Array1<A>,
+    diagnosis: Diagnosis,
+}
+
+/// Whether a layer and a scaler from outside are finite and fit each other.
+pub(crate) fn check_layer<A: Scalar>(
+    hidden: &HiddenLayer<A>,
+    scaler: Option<&Scaler<A>>,
+) -> Result<()> {
+    let (inputs, neurons) = hidden.weights().dim();
+    check_matrix("hidden weights", hidden.weights())?;
+    check_length("hidden biases", hidden.biases().len(), neurons)?;
+    check_matrix("hidden biases", hidden.biases().insert_axis(Axis(0)))?;
+    for vector in scaler.iter().flat_map(|s| [s.mean(), s.factor()]) {
+        check_length("inputs of the scaler", vector.len(), inputs)?;
+        check_matrix("the scaler", vector.insert_axis(Axis(0)))?;
+    }
+    Ok(())
+}
+
+impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
+    type Error = Error;
+
+    fn try_from(parts: Parts<A>) -> Result<Self> {
+        let Parts {
+            scaler,
+            hidden,
+            direct_links,
+            beta,
+            intercept,
+            diagnosis,
+        } = parts;
+        check_layer(&hidden, scaler.as_ref())?;
+        let (inputs, neurons) = hidden.weights().dim();
+        check_matrix("output weights", beta.view())?;
+        let columns = neurons + if direct_links { inputs } else { 0 };
+        check_length("rows of output weights", beta.nrows(), columns)?;
+        check_length("intercepts", intercept.len(), beta.ncols())?;
+        check_matrix("intercepts", intercept.view().insert_axis(Axis(0)))?;
+        Ok(Self {
+            scaler,
+            hidden,
+            direct_links,
+            beta,
+            intercept,
+            diagnosis,
+        })
+    }
+}
+
 impl<A: Scalar> Elm<A> {
+    pub(crate) fn assemble(
+        scaler: Option<Scaler<A>>,
+        hidden: HiddenLayer<A>,
+        direct_links: bool,
+        solution: Solution<A>,
+    ) -> Self {
+        let Solution {
+            beta,
+            intercept,
+            diagnosis,
+        } = solution;
+        Self {
+            scaler,
+            hidden,
+            direct_links,
+            beta,
+            intercept,
+            diagnosis,
+        }
+    }
+
     /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs).
     ///
     /// # Errors
@@ -301,6 +525,23 @@ impl<A: Scalar> Elm<A> {
     #[must_use]
     pub fn predictor(&self) -> Predictor<A> {
         Predictor::new(self)
+    }
+
+    /// The hidden-layer matrix of these inputs (the paper's $F$, equation 9): shape (rows, inputs)
+    /// to (rows, neurons), followed by the standardised inputs where they are linked directly.
+    /// Times [`beta`](Self::beta) plus [`intercept`](Self::intercept) it is the prediction.
+    ///
+    /// # Errors
+    /// [`Error::Shape`], [`Error::Empty`] and [`Error::NotFinite`] for `x`.
+    pub fn hidden_matrix(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
+        check_length("inputs", x.ncols(), self.inputs())?;
+        check_matrix("inputs", x.view())?;
+        let scaled = self
+            .scaler
+            .as_ref()
+            .map(|scaler| scaler.transform(x.view()));
+        let x = scaled.as_ref().map_or(x.view(), |scaled| scaled.view());
+        Ok(design(&self.hidden, self.direct_links, x))
     }
 
     /// Number of inputs.

@@ -1,9 +1,11 @@
 //! Standardisation of inputs: mean 0 and standard deviation 1 over the training rows.
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Zip};
+use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2, Axis, Zip};
 use serde::{Deserialize, Serialize};
 
+use crate::error::{Error, Result};
 use crate::scalar::Scalar;
+use crate::solve::{check_length, check_matrix};
 
 /// Subtracts each input's mean and divides by its standard deviation (with divisor $n$).
 ///
@@ -18,6 +20,46 @@ pub struct Scaler<A: Scalar> {
 }
 
 impl<A: Scalar> Scaler<A> {
+    /// Measures the columns of `x`, shape (rows, inputs), as a fit does with its training rows.
+    ///
+    /// # Errors
+    /// [`Error::Empty`] and [`Error::NotFinite`].
+    pub fn measured(x: &ArrayRef2<A>) -> Result<Self> {
+        check_matrix("inputs", x.view())?;
+        Ok(Self::measure(x.view()))
+    }
+
+    /// From the mean and standard deviation of each input, known beforehand. An input of deviation
+    /// 0 is taken for constant.
+    ///
+    /// # Errors
+    /// [`Error::Empty`] without inputs, [`Error::Shape`] when the lengths differ,
+    /// [`Error::NotFinite`], and [`Error::Parameter`] for a negative deviation.
+    pub fn new(mean: &ArrayRef1<A>, deviation: &ArrayRef1<A>) -> Result<Self> {
+        check_length("deviations", deviation.len(), mean.len())?;
+        check_matrix("means", mean.view().insert_axis(Axis(0)))?;
+        check_matrix("deviations", deviation.view().insert_axis(Axis(0)))?;
+        if let Some(bad) = deviation.iter().find(|d| **d < A::zero()) {
+            return Err(Error::Parameter {
+                name: "deviation",
+                value: bad.as_f64(),
+                expected: "not negative",
+            });
+        }
+        let factor = deviation.mapv(|d| {
+            let factor = d.recip();
+            if factor.is_finite() {
+                factor
+            } else {
+                A::zero()
+            }
+        });
+        Ok(Self {
+            mean: mean.to_owned(),
+            factor,
+        })
+    }
+
     /// Measures the columns of `x`, shape (rows, inputs), which must be finite and not empty.
     pub(crate) fn measure(x: ArrayView2<'_, A>) -> Self {
         let (mean, factor): (Vec<_>, Vec<_>) = x.columns().into_iter().map(mean_and_factor).unzip();

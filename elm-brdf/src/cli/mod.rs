@@ -1,7 +1,11 @@
 //! The command line: what was typed, checked, carried out and printed. Nothing else in this crate
 //! prints.
 
+mod common;
+mod compare;
 mod data;
+#[cfg(feature = "fetch")]
+mod fetch;
 mod reproduce;
 
 use std::io::{self, Write};
@@ -23,6 +27,9 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Reproduce(reproduce::Arguments),
+    Compare(compare::Arguments),
+    #[cfg(feature = "fetch")]
+    Fetch(fetch::Arguments),
 }
 
 /// Why a command ended without doing its work.
@@ -34,6 +41,10 @@ enum Failure {
     /// It made sense, and failed: exit code 1.
     #[error(transparent)]
     Failed(#[from] Error),
+    /// It made sense, and another argument would let it through: exit code 1.
+    #[cfg(feature = "fetch")]
+    #[error("{0}")]
+    Refused(String),
     /// Whoever reads the output stopped reading, as `head` does: success.
     #[error("broken pipe")]
     BrokenPipe,
@@ -49,9 +60,12 @@ impl From<elm_datasets::Error> for Failure {
 #[must_use]
 pub fn run() -> ExitCode {
     let outcome = match Arguments::try_parse() {
-        Ok(Arguments {
-            command: Command::Reproduce(arguments),
-        }) => reproduce::run(&arguments),
+        Ok(Arguments { command }) => match command {
+            Command::Reproduce(arguments) => reproduce::run(&arguments),
+            Command::Compare(arguments) => compare::run(&arguments),
+            #[cfg(feature = "fetch")]
+            Command::Fetch(arguments) => fetch::run(&arguments),
+        },
         Err(error) => explain(&error),
     };
     match outcome {

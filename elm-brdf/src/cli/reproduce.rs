@@ -1,20 +1,16 @@
 //! `elm-brdf reproduce`: the paper's Tables I to III, recomputed.
 
-use std::io::{self, IsTerminal};
 use std::path::PathBuf;
-use std::str::FromStr;
 use std::time::Instant;
 
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use elm::solve::Solver;
 use elm::{Activation, ElmParams};
 use elm_datasets::Invalid;
-use indicatif::{ProgressBar, ProgressStyle};
 
-use super::data::{self, Source};
-use super::{Failure, print, say};
-use crate::error::Error;
+use super::common::{hint, one_of, progress, usage};
+use super::data::Source;
+use super::{Failure, print};
 use crate::features::Features;
 use crate::link::Link;
 use crate::model::BrdfParams;
@@ -36,13 +32,28 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "LIST", default_value = "paper")]
     materials: String,
     /// Number of folds, at least 2.
-    #[arg(long, value_name = "N", default_value_t = 10)]
+    #[arg(
+        long,
+        value_name = "N",
+        allow_negative_numbers = true,
+        default_value_t = 10
+    )]
     folds: usize,
     /// Seed of the random layer and of the folds.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(
+        long,
+        value_name = "N",
+        allow_negative_numbers = true,
+        default_value_t = 1
+    )]
     seed: u64,
     /// Hidden neurons, at least 1.
-    #[arg(long, value_name = "N", default_value_t = 50)]
+    #[arg(
+        long,
+        value_name = "N",
+        allow_negative_numbers = true,
+        default_value_t = 50
+    )]
     neurons: usize,
     /// Activation function of the hidden neurons.
     #[arg(long, value_name = "NAME", default_value = "sigmoid",
@@ -66,32 +77,23 @@ pub(super) struct Arguments {
     invalid: Invalid,
 }
 
-/// Reads one of `names`, and lists them in the help and in the error.
-fn one_of<T>(names: impl IntoIterator<Item = &'static str>) -> impl TypedValueParser<Value = T>
-where
-    T: FromStr<Err: std::error::Error + Send + Sync + 'static> + Clone + Send + Sync + 'static,
-{
-    PossibleValuesParser::new(names).try_map(|name| name.parse())
-}
-
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
-    let usage = |error: &dyn std::fmt::Display| Failure::Usage(error.to_string());
     let network = ElmParams::new(arguments.neurons)
         .activation(arguments.activation.clone())
         .solver(arguments.solver)
         // Equation 7 has no constant term.
         .intercept(false)
         .seed(arguments.seed);
-    network.clone().check().map_err(|error| usage(&error))?;
+    network.clone().check().map_err(usage)?;
 
     let source = Source::find(arguments.data.as_deref())?;
     let materials = source.select(&arguments.materials)?;
     let data = source.load(&materials, arguments.invalid)?;
     let load = start.elapsed().as_secs_f64();
 
-    let folds = Folds::new(data.directions.len(), arguments.folds, arguments.seed)
-        .map_err(|error| usage(&error))?;
+    let folds =
+        Folds::new(data.directions.len(), arguments.folds, arguments.seed).map_err(usage)?;
     let params = BrdfParams {
         features: Features::Paper,
         link: Link::Identity,
@@ -107,10 +109,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         folds: arguments.folds,
         seed: arguments.seed,
     };
-    if source == Source::Synthetic && io::stderr().is_terminal() {
-        hint();
-    }
-    let progress = progress();
+    hint(&source);
+    let progress = progress("fold");
     let scores = cross_validate(&params, &data, &folds, |done, all| {
         progress.set_length(all as u64);
         progress.set_position(done as u64);
@@ -129,27 +129,4 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         report.write(dir)?;
     }
     print(&report.render(arguments.format)?)
-}
-
-fn hint() {
-    let cache = data::cache().map_or_else(String::new, |dir| {
-        format!(", or put them in {}", dir.display())
-    });
-    say(&format!(
-        "note: no CUReT files; name their folder with --data or {}{cache}",
-        data::VARIABLE
-    ));
-}
-
-fn progress() -> ProgressBar {
-    // indicatif draws on standard error, and not at all where that is no terminal.
-    let bar = ProgressBar::new(0);
-    let style = ProgressStyle::with_template("{bar:40} fold {pos}/{len}, {eta} left");
-    bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-}
-
-impl From<elm::Error> for Failure {
-    fn from(error: elm::Error) -> Self {
-        Self::Failed(Error::from(error))
-    }
 }

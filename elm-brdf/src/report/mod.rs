@@ -1,5 +1,6 @@
 //! What `reproduce` found, as one value, and its forms: text, Markdown, CSV and JSON.
 
+mod comparison;
 mod csv;
 mod tables;
 
@@ -14,6 +15,8 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::protocol::{MaterialScores, Metrics};
 use crate::published;
+
+pub use comparison::{Comparison, Entry};
 
 /// Everything that `reproduce` prints. Its JSON form is this structure, field for field.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -162,14 +165,7 @@ impl Report {
             })
             .collect();
         Self {
-            data: Data {
-                source,
-                synthetic,
-                channels: data.channels.clone(),
-                materials: materials.len(),
-                measurements: data.directions.len(),
-                invalid: data.invalid,
-            },
+            data: Data::of(source, data),
             protocol,
             summary: Summary::of(&materials),
             materials,
@@ -186,15 +182,7 @@ impl Report {
             Format::Table => Ok(tables::render(self, tables::Style::Text)),
             Format::Markdown => Ok(tables::render(self, tables::Style::Markdown)),
             Format::Csv => csv::render(self),
-            Format::Json => {
-                let mut text =
-                    serde_json::to_string_pretty(self).map_err(|error| Error::Write {
-                        path: "report.json".into(),
-                        reason: error.into(),
-                    })?;
-                text.push('\n');
-                Ok(text)
-            }
+            Format::Json => json(self),
         }
     }
 
@@ -220,6 +208,28 @@ impl Report {
             })
             .collect()
     }
+}
+
+impl Data {
+    fn of(source: String, data: &Measurements) -> Self {
+        Self {
+            source,
+            synthetic: data.origin != Origin::Curet,
+            channels: data.channels.clone(),
+            materials: data.materials.len(),
+            measurements: data.directions.len(),
+            invalid: data.invalid,
+        }
+    }
+}
+
+fn json(report: &impl Serialize) -> Result<String> {
+    let mut text = serde_json::to_string_pretty(report).map_err(|error| Error::Write {
+        path: "report.json".into(),
+        reason: error.into(),
+    })?;
+    text.push('\n');
+    Ok(text)
 }
 
 /// Writes beside the file and renames, so that an interruption leaves the old one.

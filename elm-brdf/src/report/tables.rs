@@ -143,14 +143,7 @@ fn heading(out: &mut String, report: &Report, style: Style) {
 }
 
 fn table(report: &Report, measure: Measure, compared: bool, style: Style) -> String {
-    let mut table = Table::new();
-    table.load_preset(match style {
-        Style::Text => presets::ASCII_FULL_CONDENSED,
-        Style::Markdown => presets::ASCII_MARKDOWN,
-    });
-    if style == Style::Text {
-        table.load_preset("     --            ");
-    }
+    let mut table = styled(style);
     let mut header = vec!["material", "channel", "train", "held out", "fold mean"];
     if compared {
         header.extend(["paper", "held out / paper"]);
@@ -185,8 +178,18 @@ fn table(report: &Report, measure: Measure, compared: bool, style: Style) -> Str
     table.to_string()
 }
 
+/// An empty table that looks as the style wants it.
+pub(super) fn styled(style: Style) -> Table {
+    let mut table = Table::new();
+    table.load_preset(match style {
+        Style::Text => "     --            ",
+        Style::Markdown => presets::ASCII_MARKDOWN,
+    });
+    table
+}
+
 /// Without the blanks that pad the last column.
-fn trim(table: &str) -> String {
+pub(super) fn trim(table: &str) -> String {
     table
         .lines()
         .map(str::trim_end)
@@ -256,7 +259,7 @@ fn summary(out: &mut String, report: &Report, style: Style, compared: bool) {
     );
 }
 
-fn push(out: &mut String, text: std::fmt::Arguments<'_>) {
+pub(super) fn push(out: &mut String, text: std::fmt::Arguments<'_>) {
     // Writing to a String cannot fail.
     let _ = out.write_fmt(text);
 }

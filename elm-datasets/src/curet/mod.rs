@@ -18,7 +18,6 @@ mod parse;
 pub mod rig;
 mod write;
 
-use std::fs;
 use std::path::Path;
 
 use ndarray::{Array2, ArrayViewMut1};
@@ -27,12 +26,18 @@ pub use names::{MATERIALS, MaterialId, NAMES};
 pub use write::write;
 
 use crate::Error;
+use crate::file;
 use crate::measurements::{Invalid, Material, Measurements, Origin};
 
 /// How many pairs of directions there are.
 pub const MEASUREMENTS: usize = 205;
 
-const TABLE: &str = "table.txt";
+/// The file of the directions.
+pub const TABLE: &str = "table.txt";
+
+/// The files of the values: the mean of the channels, red, green and blue.
+pub const VALUES: [&str; 4] = [AVERAGE[0].1, COLOURS[0].1, COLOURS[1].1, COLOURS[2].1];
+
 const AVERAGE: [(&str, &str); 1] = [("average", "abrdf.dat")];
 const COLOURS: [(&str, &str); 3] = [
     ("red", "rbrdf.dat"),
@@ -83,21 +88,21 @@ fn value_files(dir: &Path) -> Result<&'static [(&'static str, &'static str)], Er
 pub fn read(dir: &Path, ids: &[MaterialId], invalid: Invalid) -> Result<Measurements, Error> {
     let files = value_files(dir)?;
     let path = dir.join(TABLE);
-    let directions = parse::table(&path, &bytes(&path)?)?;
+    let directions = parse::table(&path, &file::read(&path)?)?;
     let mut wanted: Vec<(MaterialId, Array2<f64>)> = Vec::new();
     for &id in ids {
         if wanted.iter().all(|&(other, _)| other != id) {
             wanted.push((id, Array2::zeros((MEASUREMENTS, files.len()))));
         }
     }
-    for (channel, (_, file)) in files.iter().enumerate() {
-        let path = dir.join(file);
+    for (channel, (_, name)) in files.iter().enumerate() {
+        let path = dir.join(name);
         let mut columns: Vec<Option<ArrayViewMut1<'_, f64>>> = Vec::new();
         columns.resize_with(MATERIALS, || None);
         for (id, values) in &mut wanted {
             columns[id.index()] = Some(values.column_mut(channel));
         }
-        parse::values(&path, &bytes(&path)?, |id| columns[id.index()].take())?;
+        parse::values(&path, &file::read(&path)?, |id| columns[id.index()].take())?;
     }
     let materials = wanted
         .into_iter()
@@ -112,9 +117,22 @@ pub fn read(dir: &Path, ids: &[MaterialId], invalid: Invalid) -> Result<Measurem
     ))
 }
 
-fn bytes(path: &Path) -> Result<Vec<u8>, Error> {
-    fs::read(path).map_err(|reason| Error::Read {
-        path: path.to_owned(),
-        reason,
-    })
+/// Checks that these are the bytes of a whole `table.txt`. `name` takes the place of the file in
+/// errors.
+///
+/// # Errors
+/// As for [`read`], of a damaged file.
+pub fn check_table(bytes: &[u8], name: impl AsRef<Path>) -> Result<(), Error> {
+    parse::table(name.as_ref(), bytes).map(|_| ())
+}
+
+/// Checks that these are the bytes of a whole value file, with all materials. `name` takes the
+/// place of the file in errors.
+///
+/// # Errors
+/// As for [`read`], of a damaged file.
+pub fn check_values(bytes: &[u8], name: impl AsRef<Path>) -> Result<(), Error> {
+    let mut values = Array2::zeros((MATERIALS, MEASUREMENTS));
+    let mut rows: Vec<_> = values.rows_mut().into_iter().map(Some).collect();
+    parse::values(name.as_ref(), bytes, |id| rows[id.index()].take())
 }

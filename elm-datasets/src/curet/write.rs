@@ -1,8 +1,6 @@
 //! Numbers to text, in the database's own layout.
 
 use std::fmt::Write as _;
-use std::fs;
-use std::io::Write as _;
 use std::path::Path;
 
 use super::parse::{Wrong, check_angles};
@@ -150,26 +148,6 @@ fn values_text(materials: &[&Material], channel: usize) -> String {
     text
 }
 
-/// Puts the whole file in place in one step, or leaves what was there.
 fn save(dir: &Path, file: &str, text: &str) -> Result<(), Error> {
-    let path = dir.join(file);
-    let attempt = || {
-        fs::create_dir_all(dir)?;
-        let mut beside = beside(dir)?;
-        beside.write_all(text.as_bytes())?;
-        beside.persist(&path).map_err(|error| error.error)?;
-        Ok(())
-    };
-    attempt().map_err(|reason| Error::Write {
-        path: path.clone(),
-        reason,
-    })
-}
-
-/// A temporary file in `dir`, with the access rights of an ordinary one.
-fn beside(dir: &Path) -> std::io::Result<tempfile::NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(dir)
+    crate::file::replace(&dir.join(file), |out| out.write_all(text.as_bytes()))
 }

@@ -1,10 +1,11 @@
-//! What the tests of the CUReT files share.
+//! What the tests of files share.
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, clippy::print_stderr)]
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use elm_datasets::{Invalid, MaterialId, curet, synthetic};
+use proptest::prelude::*;
 
 pub fn all() -> Vec<MaterialId> {
     MaterialId::all().collect()
@@ -36,4 +37,40 @@ pub fn real() -> Option<PathBuf> {
         eprintln!("skipped: no CUReT files in {}", given.display());
     }
     found
+}
+
+/// A folder of the shared data, or `None` after saying that the test is skipped.
+pub fn shared(name: &str) -> Option<PathBuf> {
+    let shared = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared");
+    let given = std::env::var_os("ELM_BRDF_DATA").map_or_else(|| shared.into(), PathBuf::from);
+    let dir = given.join(name);
+    if dir.is_dir() {
+        return Some(dir);
+    }
+    eprintln!("skipped: no {}", dir.display());
+    None
+}
+
+/// A place, a byte, and whether it replaces, is inserted or removes.
+pub type Change = (prop::sample::Index, u8, u8);
+
+pub fn changes() -> impl Strategy<Value = Vec<Change>> {
+    proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0..3u8), 1..8)
+}
+
+pub fn mutate(mut bytes: Vec<u8>, changes: Vec<Change>) -> Vec<u8> {
+    for (place, byte, kind) in changes {
+        if bytes.is_empty() {
+            break;
+        }
+        let place = place.index(bytes.len());
+        match kind {
+            0 => bytes[place] = byte,
+            1 => bytes.insert(place, byte),
+            _ => {
+                bytes.remove(place);
+            }
+        }
+    }
+    bytes
 }

@@ -8,15 +8,17 @@ use faer::linalg::householder::{
 };
 use faer::linalg::lu::partial_pivoting as lu;
 use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::qr::no_pivoting as qr;
 use faer::linalg::svd::{ComputeSvdVectors, svd, svd_scratch};
+use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::linalg::{cholesky::llt, triangular_solve};
 use faer::traits::RealField;
 use faer::{Accum, Conj, MatMut, MatRef, Par};
 use ndarray::{Array1, Array2, ArrayView2, Axis, CowArray, Ix2, ShapeBuilder, s};
 use num_traits::Zero;
 
-use super::{Failure, Kernel, Svd, Triangular};
+use super::{Failure, Kernel, Positive, Svd, Triangular};
 
 const PAR: Par = Par::Seq;
 
@@ -193,10 +195,38 @@ fn solve_square<A: RealField + Copy + Zero + PartialEq>(
     Ok(x)
 }
 
-fn solve_positive<A: RealField + Copy + Zero>(
+fn gram<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>) -> Array2<A> {
+    let n = a.ncols();
+    let mut out = Array2::zeros((n, n).f());
+    if a.is_empty() {
+        return out;
+    }
+    let a = gapless(a);
+    let a = view(a.view());
+    // Half the work of a product.
+    triangular::matmul(
+        view_mut(&mut out),
+        BlockStructure::TriangularLower,
+        Accum::Replace,
+        a.transpose(),
+        BlockStructure::Rectangular,
+        a,
+        BlockStructure::Rectangular,
+        faer::traits::math_utils::one(),
+        PAR,
+    );
+    for column in 1..n {
+        for row in 0..column {
+            out[[row, column]] = out[[column, row]];
+        }
+    }
+    out
+}
+
+fn solve_positive<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
     a: ArrayView2<'_, A>,
     b: ArrayView2<'_, A>,
-) -> Result<Array2<A>, Failure> {
+) -> Result<Positive<A>, Failure> {
     let n = a.nrows();
     let mut factor = by_columns(a);
     let mut x = by_columns(b);
@@ -212,7 +242,11 @@ fn solve_positive<A: RealField + Copy + Zero>(
     let lower = view(factor.view());
     triangular_solve::solve_lower_triangular_in_place(lower, view_mut(&mut x), PAR);
     triangular_solve::solve_upper_triangular_in_place(lower.transpose(), view_mut(&mut x), PAR);
-    Ok(x)
+    // With A = L L^T the trace of the inverse is the sum of squares of L^-1.
+    let mut inverse = Array2::zeros((n, n).f());
+    invert_lower_triangular(view_mut(&mut inverse), lower, PAR);
+    let inverse_trace = inverse.iter().fold(A::zero(), |sum, &v| sum + v * v);
+    Ok(Positive { x, inverse_trace })
 }
 
 macro_rules! kernel {
@@ -244,10 +278,14 @@ macro_rules! kernel {
                 solve_square(a, b)
             }
 
+            fn gram(a: ArrayView2<'_, Self>) -> Array2<Self> {
+                gram(a)
+            }
+
             fn solve_positive(
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
-            ) -> Result<Array2<Self>, Failure> {
+            ) -> Result<Positive<Self>, Failure> {
                 solve_positive(a, b)
             }
         }

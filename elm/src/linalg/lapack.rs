@@ -1,13 +1,40 @@
 //! LAPACK, by way of ndarray-linalg, over the system's OpenBLAS.
 
-use ndarray::{Array1, Array2, ArrayView2, Axis, Zip};
+use std::ffi::c_int;
+use std::sync::Once;
+
+use ndarray::{Array1, Array2, ArrayView2, Axis};
 use ndarray_linalg::error::LinalgError;
 use ndarray_linalg::{
-    Cholesky, Diag, Factorize, JobSvd, Lapack, QR, SVDDC, Scalar as _, Solve, SolveTriangular, UPLO,
+    CholeskyInto, Diag, FactorizeInto, JobSvd, Lapack, QRInto, SVDDCInto, Solve, SolveTriangular,
+    UPLO,
 };
 use num_traits::Zero;
 
-use super::{Failure, Kernel, Svd, Triangular};
+use super::{Failure, Kernel, Positive, Svd, Triangular};
+
+#[allow(unsafe_code)]
+unsafe extern "C" {
+    // Of OpenBLAS itself, in every version of it; void and free of preconditions.
+    safe fn openblas_set_num_threads(threads: c_int);
+}
+
+/// Keeps OpenBLAS to one thread, in the whole process.
+///
+/// Not a matter of speed alone: its parallel LU and triangular solves put more than 1 MB on the
+/// stack of the calling thread, which is the end of a Rust thread with the usual 2 MB.
+fn sequential() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| openblas_set_num_threads(1));
+}
+
+/// A copy laid out by rows. ndarray-linalg refuses the strides that a row or column of a larger
+/// matrix keeps.
+fn by_rows<A: Copy + Zero>(a: ArrayView2<'_, A>) -> Array2<A> {
+    let mut out = Array2::zeros(a.dim());
+    out.assign(&a);
+    out
+}
 
 fn no_convergence(_: LinalgError) -> Failure {
     Failure::NoConvergence
@@ -18,7 +45,10 @@ fn pivot(_: LinalgError) -> Failure {
 }
 
 fn decompose<A: Lapack<Real = A>>(a: ArrayView2<'_, A>) -> Result<Svd<A>, Failure> {
-    match a.svddc(JobSvd::Some).map_err(no_convergence)? {
+    match by_rows(a)
+        .svddc_into(JobSvd::Some)
+        .map_err(no_convergence)?
+    {
         (Some(u), s, Some(vt)) => Ok(Svd { u, s, vt }),
         _ => Err(Failure::NoConvergence),
     }
@@ -28,7 +58,7 @@ fn triangularise<A: Lapack<Real = A>>(
     a: ArrayView2<'_, A>,
     b: ArrayView2<'_, A>,
 ) -> Result<Triangular<A>, Failure> {
-    let (q, r) = a.qr().map_err(no_convergence)?;
+    let (q, r) = by_rows(a).qr_into().map_err(no_convergence)?;
     let qtb = q.t().dot(&b);
     let rest = &b - &q.dot(&qtb);
     let unreached = rest.map_axis(Axis(0), |column| column.iter().map(|v| v.square()).sum());
@@ -39,10 +69,10 @@ fn solve_square<A: Lapack<Real = A>>(
     a: ArrayView2<'_, A>,
     b: ArrayView2<'_, A>,
 ) -> Result<Array2<A>, Failure> {
-    let factor = a.factorize().map_err(pivot)?;
+    let factor = by_rows(a).factorize_into().map_err(pivot)?;
     let mut x = Array2::zeros(b.dim());
     for (mut solution, right) in x.columns_mut().into_iter().zip(b.columns()) {
-        solution.assign(&factor.solve(&right).map_err(pivot)?);
+        solution.assign(&factor.solve_into(right.to_owned()).map_err(pivot)?);
     }
     Ok(x)
 }
@@ -50,36 +80,47 @@ fn solve_square<A: Lapack<Real = A>>(
 fn solve_positive<A: Lapack<Real = A>>(
     a: ArrayView2<'_, A>,
     b: ArrayView2<'_, A>,
-) -> Result<Array2<A>, Failure> {
-    let lower: Array2<A> = a.cholesky(UPLO::Lower).map_err(pivot)?;
+) -> Result<Positive<A>, Failure> {
+    let lower: Array2<A> = by_rows(a).cholesky_into(UPLO::Lower).map_err(pivot)?;
+    // With A = L L^T the trace of the inverse is the sum of squares of L^-1.
+    let inverse = lower
+        .solve_triangular(UPLO::Lower, Diag::NonUnit, &Array2::eye(a.nrows()))
+        .map_err(pivot)?;
     let upper = lower.t().as_standard_layout().into_owned();
     let half = lower
-        .solve_triangular(UPLO::Lower, Diag::NonUnit, &b)
+        .solve_triangular(UPLO::Lower, Diag::NonUnit, &by_rows(b))
         .map_err(pivot)?;
-    upper
-        .solve_triangular(UPLO::Upper, Diag::NonUnit, &half)
-        .map_err(pivot)
+    Ok(Positive {
+        x: upper
+            .solve_triangular(UPLO::Upper, Diag::NonUnit, &half)
+            .map_err(pivot)?,
+        inverse_trace: inverse.iter().map(|v| v.square()).sum(),
+    })
 }
 
 macro_rules! kernel {
     ($($scalar:ty),*) => {$(
         impl Kernel for $scalar {
             fn product(a: ArrayView2<'_, Self>, b: ArrayView2<'_, Self>) -> Array2<Self> {
+                sequential();
                 a.dot(&b)
             }
 
             fn svd(a: ArrayView2<'_, Self>) -> Result<Svd<Self>, Failure> {
+                sequential();
                 decompose(a)
             }
 
             fn singular_values(a: ArrayView2<'_, Self>) -> Result<Array1<Self>, Failure> {
-                Ok(a.svddc(JobSvd::None).map_err(no_convergence)?.1)
+                sequential();
+                Ok(by_rows(a).svddc_into(JobSvd::None).map_err(no_convergence)?.1)
             }
 
             fn triangularise(
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
             ) -> Result<Triangular<Self>, Failure> {
+                sequential();
                 triangularise(a, b)
             }
 
@@ -87,13 +128,20 @@ macro_rules! kernel {
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
             ) -> Result<Array2<Self>, Failure> {
+                sequential();
                 solve_square(a, b)
+            }
+
+            fn gram(a: ArrayView2<'_, Self>) -> Array2<Self> {
+                sequential();
+                a.t().dot(&a)
             }
 
             fn solve_positive(
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
-            ) -> Result<Array2<Self>, Failure> {
+            ) -> Result<Positive<Self>, Failure> {
+                sequential();
                 solve_positive(a, b)
             }
         }

@@ -48,6 +48,16 @@ pub struct Triangular<A> {
     pub unreached: Array1<A>,
 }
 
+/// The answer of a symmetric positive definite system.
+#[derive(Debug, Clone)]
+pub struct Positive<A> {
+    /// The solution, as many columns as the right-hand side.
+    pub x: Array2<A>,
+    /// The trace of the inverse, the sum of 1 / eigenvalue: at least the norm of the inverse, at
+    /// most that times the dimension.
+    pub inverse_trace: A,
+}
+
 /// Why a primitive gave no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Failure {
@@ -82,18 +92,22 @@ pub trait Kernel: Sized {
         b: ArrayView2<'_, Self>,
     ) -> Result<Array2<Self>, Failure>;
 
-    /// Solves $A X = B$ for symmetric positive definite $A$ by Cholesky.
+    /// $A^T A$, both halves.
+    fn gram(a: ArrayView2<'_, Self>) -> Array2<Self>;
+
+    /// Solves $A X = B$ for symmetric positive definite $A$ by Cholesky. Only the lower half of
+    /// `a` is read.
     fn solve_positive(
         a: ArrayView2<'_, Self>,
         b: ArrayView2<'_, Self>,
-    ) -> Result<Array2<Self>, Failure>;
+    ) -> Result<Positive<Self>, Failure>;
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::Scalar;
-    use approx::assert_abs_diff_eq;
+    use approx::{assert_abs_diff_eq, assert_relative_eq};
     use ndarray::{Array, Axis, array};
     use ndarray_rand::RandomExt;
     use ndarray_rand::rand_distr::StandardNormal;
@@ -140,6 +154,28 @@ mod tests {
     }
 
     #[test]
+    fn parts_of_a_larger_matrix_are_taken_as_they_lie() {
+        let whole = random(90, 80, 8);
+        for size in [1, 2, 30] {
+            let part = whole.slice(ndarray::s![3..3 + 2 * size;2, 5..5 + size]);
+            let part = part.slice(ndarray::s![..size.min(part.nrows()), ..]);
+            let copy = part.to_owned().as_standard_layout().into_owned();
+            assert_eq!(f64::svd(part).unwrap().s, f64::svd(copy.view()).unwrap().s);
+            let right = whole.slice(ndarray::s![..part.nrows(), 7..8]);
+            let one = f64::triangularise(part, right).unwrap();
+            let other = f64::triangularise(copy.view(), right.to_owned().view()).unwrap();
+            assert_eq!((one.r, one.qtb), (other.r, other.qtb));
+            assert_eq!(
+                f64::solve_square(part, right).unwrap(),
+                f64::solve_square(copy.view(), right).unwrap()
+            );
+            let positive = f64::gram(part);
+            assert_abs_diff_eq!(positive, copy.t().dot(&copy), epsilon = 1e-12);
+            assert_eq!(f64::product(part, right), f64::product(copy.view(), right));
+        }
+    }
+
+    #[test]
     fn triangularise_keeps_norms_and_normal_equations() {
         for (rows, columns) in [(1, 1), (5, 5), (40, 7), (600, 60)] {
             let (a, b) = (random(rows, columns, 3), random(rows, 4, 4));
@@ -171,10 +207,15 @@ mod tests {
                 epsilon = 1e-10
             );
             let p = a.t().dot(&a);
-            assert_abs_diff_eq!(
-                f64::solve_positive(p.view(), p.dot(&x).view()).unwrap(),
-                x,
-                epsilon = 1e-9
+            assert_abs_diff_eq!(f64::gram(a.view()), p, epsilon = 1e-10);
+            assert_abs_diff_eq!(f64::gram(a.t()), a.dot(&a.t()), epsilon = 1e-10);
+            let solved = f64::solve_positive(p.view(), p.dot(&x).view()).unwrap();
+            assert_abs_diff_eq!(solved.x, x, epsilon = 1e-9);
+            let s = f64::singular_values(a.view()).unwrap();
+            assert_relative_eq!(
+                solved.inverse_trace,
+                s.mapv(|s| s.powi(-2)).sum(),
+                max_relative = 1e-11
             );
         }
     }

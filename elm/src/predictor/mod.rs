@@ -162,7 +162,8 @@ impl<A: Scalar> Predictor<A> {
         scratch: &mut Scratch<A>,
     ) -> Result<()> {
         self.check(x, out)?;
-        let lengths = [&scratch.inputs, &scratch.hidden, &scratch.sums].map(|part| part.as_slice().len());
+        let lengths =
+            [&scratch.inputs, &scratch.hidden, &scratch.sums].map(|part| part.as_slice().len());
         for (found, expected) in lengths.into_iter().zip(self.scratch_lengths()) {
             check_length("scratch", found, expected)?;
         }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How a solver came to its answer.
+/// How a solver came to its answer; [`Reason`] says why so.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -13,6 +13,31 @@ pub enum Route {
     Svd,
     /// QR, then the singular values of $R$: much cheaper where rows outnumber neurons.
     QrSvd,
+    /// Cholesky of $H^T H$ with ridge's $\lambda$ on the diagonal.
+    Gram,
+    /// Cholesky of $H H^T$ with ridge's $\lambda$ on the diagonal, for fewer rows than neurons.
+    DualGram,
+}
+
+/// Why a solver took its [`Route`]. Between the two forms of a route the shape of the matrix
+/// decides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Reason {
+    /// Equation 10 is the solution of a square system.
+    SquareSystem,
+    /// The pseudo-inverse must tell which directions are there, which singular values do.
+    RankDecision,
+    /// All strengths are tried, and leave-one-out scored, in the coordinates of the singular
+    /// vectors.
+    StrengthSearch,
+    /// The given strength bounds the condition of the normal equations: weights have relative
+    /// errors below 1e-8 (`f64`) or 1e-3 (`f32`) by the fast route.
+    StrongRidge,
+    /// The given strength is too weak (or far too strong) for the normal equations, or the matrix
+    /// is zero.
+    WeakRidge,
 }
 
 /// The state of the problem that was solved, for the user to judge the answer by.
@@ -24,14 +49,18 @@ pub enum Route {
 pub struct Diagnosis {
     /// The way the answer was computed.
     pub route: Route,
-    /// Number of singular values above the cut-off (for ridge: above rounding error).
-    pub rank: usize,
-    /// Largest over smallest singular value counted in [`rank`](Self::rank); 1 at rank 0.
-    pub condition: f64,
+    /// Why it was computed that way.
+    pub reason: Reason,
+    /// Number of singular values above the cut-off (for ridge: above rounding error); `None` on
+    /// the routes that do not find them, [`Route::Gram`] and [`Route::DualGram`].
+    pub rank: Option<usize>,
+    /// Largest over smallest singular value counted in [`rank`](Self::rank), 1 at rank 0; `None`
+    /// with it.
+    pub condition: Option<f64>,
     /// The largest singular value.
     pub largest_singular_value: f64,
-    /// The smallest singular value counted in [`rank`](Self::rank).
-    pub smallest_singular_value: f64,
+    /// The smallest singular value counted in [`rank`](Self::rank); `None` with it.
+    pub smallest_singular_value: Option<f64>,
     /// The regularisation relative to the largest squared singular value; 0 without one.
     pub lambda: Vec<f64>,
     /// Effective degrees of freedom, the trace of the matrix that maps targets to fitted values.

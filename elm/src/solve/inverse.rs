@@ -1,10 +1,11 @@
 //! Equation 10: $\beta = H^{-1} T$ for square $H$.
 
-use ndarray::{Array1, Axis};
+use ndarray::Array1;
 use serde::{Deserialize, Serialize};
 
-use super::spectrum::rounding;
-use super::{Diagnosis, LeastSquares, Route, Solution};
+use super::frame::Prepared;
+use super::spectrum::{norm, rounding};
+use super::{Diagnosis, LeastSquares, Reason, Route, Solution};
 use crate::error::{Error, Result};
 use crate::linalg::Failure;
 use crate::scalar::Scalar;
@@ -37,7 +38,13 @@ impl Inverse {
         if rows != neurons {
             return Err(Error::NotSquare { rows, neurons });
         }
-        let s = A::singular_values(problem.hidden)?;
+        // Scaled by powers of two, so that squares inside the factorisations stay in range.
+        let Prepared {
+            hidden,
+            targets,
+            frame,
+        } = Prepared::new(problem);
+        let s = A::singular_values(hidden.view())?;
         let (largest, smallest) = (s[0], s[s.len() - 1]);
         let singular = |reciprocal_condition| Error::Singular {
             reciprocal_condition,
@@ -50,28 +57,25 @@ impl Inverse {
             };
             return Err(singular(ratio.as_f64()));
         }
-        let beta = match A::solve_square(problem.hidden, problem.targets) {
+        let scaled = match A::solve_square(hidden.view(), targets.view()) {
             Ok(beta) => beta,
             Err(Failure::Pivot) => return Err(singular((smallest / largest).as_f64())),
             Err(failure) => return Err(failure.into()),
         };
         let outputs = problem.outputs();
-        let residual = &problem.targets - &A::product(problem.hidden, beta.view());
-        let norms = |matrix: &ndarray::Array2<A>| {
-            matrix
-                .map_axis(Axis(0), |column| column.dot(&column).sqrt().as_f64())
-                .to_vec()
-        };
+        let residual = targets - A::product(hidden.view(), scaled.view());
+        let beta = frame.restore(scaled);
         let diagnosis = Diagnosis {
             route: Route::Lu,
-            rank: neurons,
-            condition: (largest / smallest).as_f64(),
-            largest_singular_value: largest.as_f64(),
-            smallest_singular_value: smallest.as_f64(),
+            reason: Reason::SquareSystem,
+            rank: Some(neurons),
+            condition: Some((largest / smallest).as_f64()),
+            largest_singular_value: frame.outer_singular_value(largest),
+            smallest_singular_value: Some(frame.outer_singular_value(smallest)),
             lambda: vec![0.0; outputs],
             degrees_of_freedom: vec![neurons as f64; outputs],
-            residual_norm: norms(&residual),
-            beta_norm: norms(&beta),
+            residual_norm: frame.outer_residual_norms(residual.columns().into_iter().map(norm)),
+            beta_norm: beta.columns().into_iter().map(norm).collect(),
             leave_one_out: None,
         };
         Ok(Solution {

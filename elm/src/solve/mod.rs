@@ -19,11 +19,13 @@
 //! let solution = Solver::from(PseudoInverse::default()).solve(&LeastSquares::new(&h, &t)?)?;
 //! assert!((solution.beta[[0, 0]] - 1.0_f64).abs() < 1e-12);
 //! assert!((solution.beta[[1, 0]] - 2.0_f64).abs() < 1e-12);
-//! assert_eq!(solution.diagnosis.rank, 2);
+//! assert_eq!(solution.diagnosis.rank, Some(2));
 //! # Ok::<(), elm::Error>(())
 //! ```
 
 mod diagnosis;
+pub(crate) mod frame;
+mod gram;
 mod inverse;
 mod pseudo_inverse;
 mod ridge;
@@ -38,8 +40,9 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::linalg::Failure;
 use crate::scalar::Scalar;
+use spectrum::Spectrum;
 
-pub use diagnosis::{Diagnosis, Route};
+pub use diagnosis::{Diagnosis, Reason, Route};
 pub use inverse::Inverse;
 pub use pseudo_inverse::PseudoInverse;
 pub use ridge::{Lambda, Ridge};
@@ -60,7 +63,10 @@ impl<'a, A: Scalar> LeastSquares<'a, A> {
     /// [`Error::Empty`] when either has no rows or no columns, [`Error::Shape`] when their rows
     /// differ, [`Error::NotFinite`] at the first NaN or infinity.
     pub fn new(hidden: &'a ArrayRef2<A>, targets: &'a ArrayRef2<A>) -> Result<Self> {
-        let (hidden, targets) = (hidden.view(), targets.view());
+        Self::of_views(hidden.view(), targets.view())
+    }
+
+    pub(crate) fn of_views(hidden: ArrayView2<'a, A>, targets: ArrayView2<'a, A>) -> Result<Self> {
         check_matrix("hidden-layer matrix", hidden)?;
         check_matrix("targets", targets)?;
         check_length("rows of targets", targets.nrows(), hidden.nrows())?;
@@ -78,13 +84,7 @@ impl<'a, A: Scalar> LeastSquares<'a, A> {
     /// [`Error::Shape`] when there is not one weight per row, [`Error::Parameter`] when one is
     /// negative or not finite or when all are 0.
     pub fn weights(mut self, weights: &'a ArrayRef1<A>) -> Result<Self> {
-        check_length("row weights", weights.len(), self.hidden.nrows())?;
-        if let Some(bad) = weights
-            .iter()
-            .find(|w| !(**w >= A::zero() && w.is_finite()))
-        {
-            return Err(weight_error(bad.as_f64()));
-        }
+        check_weights(weights.view(), self.hidden.nrows())?;
         if weights.iter().all(|w| *w == A::zero()) {
             return Err(weight_error(0.0));
         }
@@ -97,6 +97,14 @@ impl<'a, A: Scalar> LeastSquares<'a, A> {
     pub fn intercept(mut self, intercept: bool) -> Self {
         self.intercept = intercept;
         self
+    }
+
+    pub(crate) fn hidden(&self) -> ArrayView2<'a, A> {
+        self.hidden
+    }
+
+    pub(crate) fn targets(&self) -> ArrayView2<'a, A> {
+        self.targets
     }
 
     /// Number of rows.
@@ -115,6 +123,16 @@ impl<'a, A: Scalar> LeastSquares<'a, A> {
     #[must_use]
     pub fn outputs(&self) -> usize {
         self.targets.ncols()
+    }
+}
+
+/// One for each row, finite and not negative.
+pub(crate) fn check_weights<A: Scalar>(weights: ArrayView1<'_, A>, rows: usize) -> Result<()> {
+    check_length("row weights", weights.len(), rows)?;
+    let fits = |w: &&A| **w >= A::zero() && w.is_finite();
+    match weights.iter().find(|w| !fits(w)) {
+        Some(bad) => Err(weight_error(bad.as_f64())),
+        None => Ok(()),
     }
 }
 
@@ -162,18 +180,34 @@ impl Solver {
     /// answer does not fit the type; [`Error::NoConvergence`] from the factorisation.
     pub fn solve<A: Scalar>(&self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
         self.check()?;
-        let solution = match self {
+        in_range(match self {
             Self::Inverse(solver) => solver.solve(problem),
             Self::PseudoInverse(solver) => solver.solve(problem),
             Self::Ridge(solver) => solver.solve(problem),
-        }?;
-        let finite = |x: &A| x.is_finite();
-        if !(solution.beta.iter().all(finite) && solution.intercept.iter().all(finite)) {
-            return Err(Error::Overflow {
-                what: "an output weight",
-            });
+        }?)
+    }
+
+    /// Solves a problem that is known only by its spectrum.
+    pub(crate) fn solve_spectrum<A: Scalar>(&self, spectrum: &Spectrum<A>) -> Result<Solution<A>> {
+        self.check()?;
+        in_range(match self {
+            Self::Inverse(_) => {
+                return Err(Error::Conflict {
+                    first: "the solver 'inverse'",
+                    second: "an accumulator",
+                });
+            }
+            Self::PseudoInverse(solver) => solver.solve_spectrum(spectrum),
+            Self::Ridge(solver) => solver.solve_spectrum(spectrum),
+        })
+    }
+
+    /// The same, but choosing by generalised cross-validation where leave-one-out was to choose.
+    pub(crate) fn without_rows(self) -> Self {
+        match self {
+            Self::Ridge(ridge) => Self::Ridge(ridge.without_rows()),
+            other => other,
         }
-        Ok(solution)
     }
 
     /// Whether the settings are in range.
@@ -248,6 +282,17 @@ impl From<Ridge> for Solver {
     }
 }
 
+fn in_range<A: Scalar>(solution: Solution<A>) -> Result<Solution<A>> {
+    let finite = |x: &A| x.is_finite();
+    if solution.beta.iter().all(finite) && solution.intercept.iter().all(finite) {
+        Ok(solution)
+    } else {
+        Err(Error::Overflow {
+            what: "an output weight",
+        })
+    }
+}
+
 /// Not empty, and finite everywhere.
 pub(crate) fn check_matrix<A: Scalar>(what: &'static str, a: ArrayView2<'_, A>) -> Result<()> {
     let (rows, columns) = a.dim();
@@ -274,6 +319,21 @@ pub(crate) fn check_length(what: &'static str, found: usize, expected: usize) ->
             found,
         })
     }
+}
+
+/// Whether an array of this size can be allocated at all.
+pub(crate) fn check_room(what: &'static str, rows: usize, columns: usize) -> Result<()> {
+    let too_large = Error::TooLarge {
+        what,
+        rows,
+        columns,
+    };
+    let Some(entries) = rows.checked_mul(columns) else {
+        return Err(too_large);
+    };
+    // Layers are drawn in f64 whatever they are kept in.
+    let room = Vec::<f64>::new().try_reserve_exact(entries);
+    room.map_err(|_| too_large)
 }
 
 impl From<Failure> for Error {

@@ -3,8 +3,8 @@
 use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
 
-use super::spectrum::{Spectrum, rounding};
-use super::{LeastSquares, Solution};
+use super::spectrum::Spectrum;
+use super::{LeastSquares, Reason, Solution};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 
@@ -30,6 +30,12 @@ impl PseudoInverse {
         }
     }
 
+    /// The cut-off, where one was set.
+    #[must_use]
+    pub fn cutoff(&self) -> Option<f64> {
+        self.cutoff
+    }
+
     pub(super) fn check(&self) -> Result<()> {
         match self.cutoff {
             Some(value) if !(0.0..1.0).contains(&value) => Err(Error::Parameter {
@@ -42,8 +48,11 @@ impl PseudoInverse {
     }
 
     pub(super) fn solve<A: Scalar>(self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
-        let spectrum = Spectrum::new(problem)?;
-        let level = rounding::<A>(problem.rows(), problem.neurons());
+        Ok(self.solve_spectrum(&Spectrum::new(problem)?))
+    }
+
+    pub(super) fn solve_spectrum<A: Scalar>(self, spectrum: &Spectrum<A>) -> Solution<A> {
+        let level = spectrum.level();
         let cutoff = self
             .cutoff
             .map_or(level, |cutoff| A::from_f64(cutoff).max(level));
@@ -56,6 +65,6 @@ impl PseudoInverse {
             }
         });
         let lambda = vec![0.0; spectrum.c.len_of(Axis(1))];
-        Ok(spectrum.solution(&gain, cutoff, lambda, None))
+        spectrum.solution(&gain, cutoff, Reason::RankDecision, lambda, None)
     }
 }

@@ -1,11 +1,12 @@
 //! Regularised least squares: $\beta = \arg\min \lVert H\beta - T\rVert^2 + \lambda
 //! s_1^2 \lVert\beta\rVert^2$.
 
-use ndarray::{Array1, Array2, ArrayView1, Axis, Zip};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip};
 use serde::{Deserialize, Serialize};
 
-use super::spectrum::{RowSpectrum, Spectrum, rounding};
-use super::{LeastSquares, Solution};
+use super::frame::Prepared;
+use super::spectrum::{RowSpectrum, Spectrum};
+use super::{LeastSquares, Reason, Solution, gram};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 
@@ -42,6 +43,9 @@ impl Ridge {
     pub const FLOOR: f64 = 1e-12;
 
     /// A given strength, relative to the largest squared singular value.
+    ///
+    /// From about 2e-8 (in `f32` 1e-4) up to 1e6 the normal equations are well conditioned and are
+    /// solved by Cholesky, several times faster; see [`Reason::StrongRidge`].
     #[must_use]
     pub fn relative(lambda: f64) -> Self {
         Self {
@@ -82,7 +86,18 @@ impl Ridge {
         self.lambda
     }
 
-    pub(super) fn check(&self) -> Result<()> {
+    /// The strengths that are tried, rising; see [`Ridge`].
+    #[must_use]
+    pub fn candidates<A: Scalar>() -> Vec<f64> {
+        let floor = Self::FLOOR.max(A::epsilon().as_f64());
+        let steps = 4.0;
+        let first = (floor.log10() * steps).ceil() as i32;
+        (first..=8)
+            .map(|step| 10.0_f64.powf(f64::from(step) / steps))
+            .collect()
+    }
+
+    pub(crate) fn check(&self) -> Result<()> {
         match self.lambda {
             Lambda::Relative(value) if !(value > 0.0 && value.is_finite()) => {
                 Err(Error::Parameter {
@@ -96,35 +111,94 @@ impl Ridge {
     }
 
     pub(super) fn solve<A: Scalar>(self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
-        let outputs = problem.outputs();
         match self.lambda {
             Lambda::Relative(lambda) => {
-                let spectrum = Spectrum::new(problem)?;
-                Ok(answer(&spectrum, problem, &vec![lambda; outputs], None))
+                let prepared = Prepared::new(problem);
+                if gram::allowed::<A>(lambda)
+                    && let Some(solution) = gram::solve(&prepared, lambda)
+                {
+                    return Ok(solution);
+                }
+                Ok(self.solve_spectrum(&Spectrum::from_prepared(prepared)?))
             }
-            Lambda::Gcv => {
-                let spectrum = Spectrum::new(problem)?;
-                let candidates = candidates::<A>();
-                let scores = gcv_scores(&spectrum, &candidates);
-                let chosen = self.choose(&spectrum, &scores);
-                let lambda: Vec<f64> = chosen.iter().map(|&i| candidates[i]).collect();
-                Ok(answer(&spectrum, problem, &lambda, None))
-            }
+            Lambda::Gcv => Ok(self.solve_spectrum(&Spectrum::new(problem)?)),
             Lambda::LeaveOneOut => {
                 let rows = RowSpectrum::new(problem)?;
-                let candidates = candidates::<A>();
-                let scores = leave_one_out_scores(&rows, &candidates);
-                let chosen = self.choose(&rows.spectrum, &scores);
-                let lambda: Vec<f64> = chosen.iter().map(|&i| candidates[i]).collect();
-                let total = rows.spectrum.total_weight();
-                let errors = chosen.iter().enumerate().map(|(output, &i)| {
-                    let scale = rows.spectrum.target_scale()[output].as_f64();
-                    (scores[[i, output]] / total).sqrt() * scale
-                });
-                let errors = errors.collect();
-                Ok(answer(&rows.spectrum, problem, &lambda, Some(errors)))
+                let (lambda, errors) = self.by_leave_one_out(&rows);
+                // Without its only row a problem has nothing to place an intercept by.
+                let defined = rows.spectrum.can_lose_a_row();
+                let errors = defined.then_some(errors);
+                Ok(answer(
+                    &rows.spectrum,
+                    Reason::StrengthSearch,
+                    &lambda,
+                    errors,
+                ))
             }
         }
+    }
+
+    /// Solves without the rows, from which leave-one-out would choose: by generalised
+    /// cross-validation then.
+    pub(super) fn solve_spectrum<A: Scalar>(self, spectrum: &Spectrum<A>) -> Solution<A> {
+        let (reason, lambda) = match self.lambda {
+            Lambda::Relative(lambda) => (Reason::WeakRidge, vec![lambda; spectrum.c.ncols()]),
+            Lambda::Gcv | Lambda::LeaveOneOut => (Reason::StrengthSearch, self.by_gcv(spectrum)),
+        };
+        answer(spectrum, reason, &lambda, None)
+    }
+
+    pub(super) fn without_rows(self) -> Self {
+        match self.lambda {
+            Lambda::LeaveOneOut => Self {
+                lambda: Lambda::Gcv,
+                ..self
+            },
+            _ => self,
+        }
+    }
+
+    /// The strength for each output, from a factorisation that is there already.
+    pub(crate) fn strengths<A: Scalar>(self, rows: &RowSpectrum<A>) -> Vec<f64> {
+        match self.lambda {
+            Lambda::Relative(lambda) => vec![lambda; rows.spectrum.c.ncols()],
+            Lambda::Gcv => self.by_gcv(&rows.spectrum),
+            Lambda::LeaveOneOut => self.by_leave_one_out(rows).0,
+        }
+    }
+
+    fn by_gcv<A: Scalar>(self, spectrum: &Spectrum<A>) -> Vec<f64> {
+        let candidates = Self::candidates::<A>();
+        let scores = gcv_scores(spectrum, &candidates);
+        let chosen = self.choose(spectrum, &scores);
+        chosen.iter().map(|&i| candidates[i]).collect()
+    }
+
+    /// Strengths and leave-one-out errors.
+    fn by_leave_one_out<A: Scalar>(self, rows: &RowSpectrum<A>) -> (Vec<f64>, Vec<f64>) {
+        let candidates = Self::candidates::<A>();
+        let scores = leave_one_out_scores(rows, &candidates);
+        let total = rows.spectrum.total_weight();
+        let chosen = self.choose(&rows.spectrum, &scores);
+        chosen
+            .iter()
+            .zip(rows.spectrum.target_scale())
+            .enumerate()
+            .map(|(output, (&i, scale))| {
+                let error = (scores[[i, output]] / total).sqrt() * scale.as_f64();
+                (candidates[i], error)
+            })
+            .unzip()
+    }
+
+    /// The index of the smallest finite score; of (nearly) equal ones the last.
+    pub(crate) fn best(scores: ArrayView1<'_, f64>) -> usize {
+        let smallest = scores.iter().copied().fold(f64::INFINITY, f64::min);
+        let bound = smallest * (1.0 + 1e-9);
+        scores
+            .iter()
+            .rposition(|&score| score <= bound)
+            .unwrap_or(scores.len() - 1)
     }
 
     /// For each output the index of the best candidate. Of equals the strongest wins, so that a
@@ -132,46 +206,28 @@ impl Ridge {
     fn choose<A: Scalar>(self, spectrum: &Spectrum<A>, scores: &Array2<f64>) -> Vec<usize> {
         let outputs = scores.ncols();
         if !self.shared {
-            return scores.columns().into_iter().map(best).collect();
+            return scores.columns().into_iter().map(Self::best).collect();
         }
-        let variance = spectrum.c.map_axis(Axis(0), |c| c.dot(&c)) + &spectrum.unreached;
-        let variance = variance.mapv(|v| if v > A::zero() { v.as_f64() } else { 1.0 });
+        let variance = spectrum
+            .total_squares()
+            .mapv(|v| if v > A::zero() { v.as_f64() } else { 1.0 });
         let mean = (scores / &variance).sum_axis(Axis(1));
-        vec![best(mean.view()); outputs]
+        vec![Self::best(mean.view()); outputs]
     }
-}
-
-/// The index of the smallest finite score; of (nearly) equal ones the last.
-fn best(scores: ArrayView1<'_, f64>) -> usize {
-    let smallest = scores.iter().copied().fold(f64::INFINITY, f64::min);
-    let bound = smallest * (1.0 + 1e-9);
-    scores
-        .iter()
-        .rposition(|&score| score <= bound)
-        .unwrap_or(scores.len() - 1)
-}
-
-/// The strengths tried, rising.
-fn candidates<A: Scalar>() -> Vec<f64> {
-    let floor = Ridge::FLOOR.max(A::epsilon().as_f64());
-    let steps = 4.0;
-    let first = (floor.log10() * steps).ceil() as i32;
-    (first..=8)
-        .map(|step| 10.0_f64.powf(f64::from(step) / steps))
-        .collect()
 }
 
 fn answer<A: Scalar>(
     spectrum: &Spectrum<A>,
-    problem: &LeastSquares<'_, A>,
+    reason: Reason,
     lambda: &[f64],
     leave_one_out: Option<Vec<f64>>,
 ) -> Solution<A> {
     let typed: Vec<A> = lambda.iter().map(|&l| A::from_f64(l)).collect();
-    let cutoff = rounding(problem.rows(), problem.neurons());
+    let cutoff = spectrum.level();
     spectrum.solution(
         &spectrum.ridge_gain(&typed),
         cutoff,
+        reason,
         lambda.to_vec(),
         leave_one_out,
     )
@@ -203,7 +259,12 @@ fn leave_one_out_scores<A: Scalar>(rows: &RowSpectrum<A>, candidates: &[f64]) ->
     let squared = rows.u.mapv(|u| u * u);
     for (mut score, &lambda) in scores.rows_mut().into_iter().zip(candidates) {
         let held_back = rows.spectrum.ridge_held_back(A::from_f64(lambda));
-        let residuals = rows.leave_one_out(&squared, &held_back);
+        let residuals = rows.leave_one_out(
+            &(squared.dot(&held_back) + &rows.free),
+            &held_back,
+            rows.spectrum.c.view(),
+            rows.residual.view(),
+        );
         for (score, column) in score.iter_mut().zip(residuals.columns()) {
             *score = column.iter().map(|e| e.as_f64().powi(2)).sum();
         }
@@ -213,21 +274,23 @@ fn leave_one_out_scores<A: Scalar>(rows: &RowSpectrum<A>, candidates: &[f64]) ->
 
 impl<A: Scalar> RowSpectrum<A> {
     /// The (weighted) leave-one-out residuals $e_i / (1 - h_i)$ when each direction is held back
-    /// by this share, shape (rows, outputs).
+    /// by this share, shape (rows, outputs), given the $1 - h_i$ and the outputs' coordinates and
+    /// residuals.
     ///
     /// Numerator and denominator are sums of what is held back, never differences of what is
     /// kept: $1 - h_i$ loses all its digits where a row is nearly interpolated, which is where
     /// the choice of $\lambda$ is decided.
-    pub(crate) fn leave_one_out(&self, squared: &Array2<A>, held_back: &Array1<A>) -> Array2<A> {
-        let held = &self.spectrum.c * &held_back.view().insert_axis(Axis(1));
+    pub(crate) fn leave_one_out(
+        &self,
+        denominators: &Array1<A>,
+        held_back: &Array1<A>,
+        c: ArrayView2<'_, A>,
+        residual: ArrayView2<'_, A>,
+    ) -> Array2<A> {
+        let held = &c * &held_back.view().insert_axis(Axis(1));
         let mut residuals = A::product(self.u.view(), held.view());
-        residuals += &self.residual;
-        let denominators = squared.dot(held_back) + &self.free;
-        Zip::from(residuals.rows_mut())
-            .and(&denominators)
-            .for_each(|mut row, &denominator| {
-                row.mapv_inplace(|e| e / denominator);
-            });
+        residuals += &residual;
+        residuals /= &denominators.view().insert_axis(Axis(1));
         residuals
     }
 }

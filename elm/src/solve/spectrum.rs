@@ -9,7 +9,8 @@
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
 
-use super::{Diagnosis, LeastSquares, Route, Solution};
+use super::frame::{Frame, Prepared};
+use super::{Diagnosis, LeastSquares, Reason, Route, Solution};
 use crate::error::Result;
 use crate::linalg::{Svd, Triangular};
 use crate::scalar::Scalar;
@@ -21,12 +22,12 @@ pub(crate) struct Spectrum<A: Scalar> {
     /// The singular values above rounding error, falling; length $k$.
     pub(crate) s: Array1<A>,
     /// Shape ($k$, neurons).
-    vt: Array2<A>,
+    pub(crate) vt: Array2<A>,
     /// $U^T \tilde T$, shape ($k$, outputs).
     pub(crate) c: Array2<A>,
     /// For each output the sum of squares of $\tilde T$ that no singular vector reaches.
     pub(crate) unreached: Array1<A>,
-    frame: Frame<A>,
+    pub(crate) frame: Frame<A>,
 }
 
 /// A [`Spectrum`] that also knows the rows, as leave-one-out needs them.
@@ -38,46 +39,25 @@ pub(crate) struct RowSpectrum<A: Scalar> {
     /// $\tilde T - U C$: the residual where nothing is held back, shape (rows, outputs).
     pub(crate) residual: Array2<A>,
     /// Share of each row's leverage that lies outside the span of $U$ and the intercept:
-    /// $1 - w_i / \sum w - \sum_j U_{ij}^2$, exactly 0 where $U$ spans everything.
+    /// $1 - w_i / \sum w - \sum_j U_{ij}^2$, exactly 0 where they span everything.
     pub(crate) free: Array1<A>,
-}
-
-/// What was done to the problem before it was factorised, to be undone on the answer.
-#[derive(Debug, Clone)]
-struct Frame<A: Scalar> {
-    rows: usize,
-    /// Rows whose weight is not 0.
-    weighted_rows: usize,
-    intercept: bool,
-    /// The largest row weight, which the others were divided by.
-    weight_scale: A,
-    /// The sum of the weights after that.
-    total_weight: A,
-    hidden_mean: Array1<A>,
-    target_mean: Array1<A>,
-    /// Powers of two that the matrices were divided by.
-    hidden_scale: A,
-    target_scale: Array1<A>,
-}
-
-/// The weighted, centred, scaled problem.
-struct Prepared<A: Scalar> {
-    hidden: Array2<A>,
-    targets: Array2<A>,
-    /// $w_i / \sum w$ with an intercept, else 0: its share of each row's leverage.
-    intercept_leverage: Array1<A>,
-    frame: Frame<A>,
+    /// The unit vector of the intercept; 0 without one.
+    pub(crate) constant: Array1<A>,
 }
 
 impl<A: Scalar> Spectrum<A> {
     /// Factorises without keeping the rows.
     pub(crate) fn new(problem: &LeastSquares<'_, A>) -> Result<Self> {
+        Self::from_prepared(Prepared::new(problem))
+    }
+
+    /// As [`new`](Self::new), for a problem that is prepared already.
+    pub(crate) fn from_prepared(prepared: Prepared<A>) -> Result<Self> {
         let Prepared {
             hidden,
             targets,
             frame,
-            ..
-        } = prepare(problem);
+        } = prepared;
         // Below twice as many rows as columns QR first costs more than it saves.
         if hidden.nrows() >= 2 * hidden.ncols() {
             let Triangular { r, qtb, unreached } = A::triangularise(hidden.view(), targets.view())?;
@@ -94,7 +74,39 @@ impl<A: Scalar> Spectrum<A> {
                 frame,
             });
         }
-        Ok(RowSpectrum::from_prepared(hidden, targets, None, frame)?.spectrum)
+        let Svd { u, s, vt } = truncate(A::svd(hidden.view())?, frame.rows);
+        let c = A::product(u.t(), targets.view());
+        let residual = if frame.spanned_by(u.ncols()) {
+            Array2::zeros(targets.dim())
+        } else {
+            targets - A::product(u.view(), c.view())
+        };
+        Ok(Self {
+            route: Route::Svd,
+            s,
+            vt,
+            c,
+            unreached: squares(residual.view()),
+            frame,
+        })
+    }
+
+    /// For a problem of which a QR factorisation has left the triangle: `unreached` is what of each
+    /// output's sum of squares lay outside it.
+    pub(crate) fn from_triangle(prepared: Prepared<A>, unreached: Array1<A>) -> Result<Self> {
+        let mut spectrum = Self::from_prepared(prepared)?;
+        spectrum.route = Route::QrSvd;
+        if spectrum.frame.spanned_by(spectrum.s.len()) {
+            spectrum.unreached.fill(A::zero());
+        } else {
+            spectrum.unreached += &unreached;
+        }
+        Ok(spectrum)
+    }
+
+    /// The level of rounding error in singular values, relative to the largest.
+    pub(crate) fn level(&self) -> A {
+        rounding(self.frame.rows, self.vt.ncols())
     }
 
     /// The number of singular values above `cutoff` times the largest.
@@ -114,43 +126,45 @@ impl<A: Scalar> Spectrum<A> {
         &self,
         gain: &Array2<A>,
         cutoff: A,
+        reason: Reason,
         lambda: Vec<f64>,
         leave_one_out: Option<Vec<f64>>,
     ) -> Solution<A> {
         let outputs = self.c.ncols();
-        let mut beta = A::product(self.vt.t(), (gain * &self.c).view());
-        for (mut column, &scale) in beta.columns_mut().into_iter().zip(&self.frame.target_scale) {
-            // Dividing first could overflow where the quotient does not.
-            column.mapv_inplace(|b| b * (scale / self.frame.hidden_scale));
-        }
-        let intercept = &self.frame.target_mean - &self.frame.hidden_mean.dot(&beta);
+        let beta = self
+            .frame
+            .restore(A::product(self.vt.t(), (gain * &self.c).view()));
+        let intercept = self.frame.constant(&beta);
 
         // The share of each direction that the fit keeps.
         let kept = gain * &self.s.view().insert_axis(Axis(1));
         let kept = |output: usize| kept.column(output.min(kept.ncols() - 1));
         let constant = f64::from(u8::from(self.frame.intercept));
-        let residual_norm = (0..outputs).map(|o| {
+        let residual_norms = (0..outputs).map(|o| {
             let left = Zip::from(kept(o))
                 .and(self.c.column(o))
                 .fold(A::zero(), |sum, &f, &c| sum + ((A::one() - f) * c).powi(2));
-            (left + self.unreached[o]).sqrt().as_f64() * self.frame.target_scale[o].as_f64()
+            (left + self.unreached[o]).sqrt().as_f64()
         });
         let rank = self.rank(cutoff);
-        let root_weight = self.frame.weight_scale.as_f64().sqrt();
-        let scale = self.frame.hidden_scale.as_f64() * root_weight;
-        let singular_value = |i: usize| self.s.get(i).map_or(0.0, |s| s.as_f64() * scale);
+        let singular_value = |i: usize| {
+            self.s
+                .get(i)
+                .map_or(0.0, |&s| self.frame.outer_singular_value(s))
+        };
         let (largest, smallest) = (singular_value(0), singular_value(rank.max(1) - 1));
         let diagnosis = Diagnosis {
             route: self.route,
-            rank,
-            condition: if rank == 0 { 1.0 } else { largest / smallest },
+            reason,
+            rank: Some(rank),
+            condition: Some(if rank == 0 { 1.0 } else { largest / smallest }),
             largest_singular_value: largest,
-            smallest_singular_value: smallest,
+            smallest_singular_value: Some(smallest),
             lambda,
             degrees_of_freedom: (0..outputs)
                 .map(|o| kept(o).sum().as_f64() + constant)
                 .collect(),
-            residual_norm: residual_norm.map(|norm| norm * root_weight).collect(),
+            residual_norm: self.frame.outer_residual_norms(residual_norms),
             beta_norm: beta.columns().into_iter().map(norm).collect(),
             leave_one_out,
         };
@@ -163,35 +177,38 @@ impl<A: Scalar> Spectrum<A> {
 
     /// Ridge's gain $s_j / (s_j^2 + \lambda s_1^2)$ for each output's relative $\lambda$.
     pub(crate) fn ridge_gain(&self, lambda: &[A]) -> Array2<A> {
-        let largest = self.s.first().copied().unwrap_or(A::zero());
-        Array2::from_shape_fn((self.s.len(), lambda.len()), |(j, o)| {
-            let s = self.s[j];
-            if s == A::zero() {
-                A::zero()
-            } else {
-                s / (s * s + lambda[o] * largest * largest)
-            }
-        })
+        let mut gain = Array2::zeros((self.s.len(), lambda.len()));
+        for (mut column, &lambda) in gain.columns_mut().into_iter().zip(lambda) {
+            column.assign(&(self.ridge_kept(lambda) / &self.s));
+        }
+        gain
     }
 
-    /// What ridge holds back of each direction, $\lambda s_1^2 / (s_j^2 + \lambda s_1^2)$,
-    /// computed without subtracting from 1.
+    /// What ridge keeps of each direction, $s_j^2 / (s_j^2 + \lambda s_1^2)$.
+    pub(crate) fn ridge_kept(&self, lambda: A) -> Array1<A> {
+        self.s.mapv(|s| share((s / self.s[0]).powi(2), lambda))
+    }
+
+    /// What ridge holds back of each direction, $\lambda s_1^2 / (s_j^2 + \lambda s_1^2)$:
+    /// nothing at $\lambda = 0$, all at infinity.
     pub(crate) fn ridge_held_back(&self, lambda: A) -> Array1<A> {
-        let largest = self.s.first().copied().unwrap_or(A::zero());
-        let absolute = lambda * largest * largest;
-        self.s.mapv(|s| {
-            if s == A::zero() {
-                A::one()
-            } else {
-                absolute / (s * s + absolute)
-            }
-        })
+        self.s.mapv(|s| share(lambda, (s / self.s[0]).powi(2)))
     }
 
     /// Weighted rows that neither the singular vectors nor the intercept account for.
     pub(crate) fn spare_rows(&self) -> usize {
         let used = self.s.len() + usize::from(self.frame.intercept);
         self.frame.weighted_rows.saturating_sub(used)
+    }
+
+    /// Whether leave-one-out exists: an intercept needs another row.
+    pub(crate) fn can_lose_a_row(&self) -> bool {
+        self.frame.weighted_rows > usize::from(self.frame.intercept)
+    }
+
+    /// For each output the sum of squares of $\tilde T$.
+    pub(crate) fn total_squares(&self) -> Array1<A> {
+        squares(self.c.view()) + &self.unreached
     }
 
     /// The sum of the row weights, the largest being 1.
@@ -211,55 +228,80 @@ impl<A: Scalar> RowSpectrum<A> {
         let Prepared {
             hidden,
             targets,
-            intercept_leverage,
             frame,
-        } = prepare(problem);
-        Self::from_prepared(hidden, targets, Some(intercept_leverage), frame)
-    }
-
-    fn from_prepared(
-        hidden: Array2<A>,
-        targets: Array2<A>,
-        intercept_leverage: Option<Array1<A>>,
-        frame: Frame<A>,
-    ) -> Result<Self> {
+        } = Prepared::new(problem);
         let Svd { u, s, vt } = truncate(A::svd(hidden.view())?, frame.rows);
         let c = A::product(u.t(), targets.view());
-        let mut residual = targets - A::product(u.view(), c.view());
-        // U spans every row, or every row but the intercept's: what is left is rounding, and
-        // leave-one-out would divide one rounding error by another.
-        let spanned = u.ncols() + usize::from(frame.intercept) >= frame.weighted_rows;
-        if spanned {
-            residual.fill(A::zero());
-        }
-        let mut free = Array1::zeros(u.nrows());
-        if let Some(leverage) = intercept_leverage {
-            Zip::from(&mut free)
-                .and(u.rows())
-                .and(&leverage)
-                .for_each(|free, row, &constant| {
-                    let own = row.dot(&row);
-                    let weightless = own == A::zero() && constant == A::zero();
-                    if weightless || !spanned {
-                        *free = (A::one() - constant - own).max(A::zero());
-                    }
-                });
-        }
-        let unreached = squares(residual.view());
-        let spectrum = Spectrum {
-            route: Route::Svd,
-            s,
-            vt,
-            c,
-            unreached,
-            frame,
-        };
-        Ok(Self {
-            spectrum,
+        let constant = frame.constant_direction();
+        let spanned = frame.spanned_by(u.ncols());
+        let mut rows = Self {
+            free: Array1::zeros(frame.rows),
+            residual: Array2::zeros(targets.dim()),
+            spectrum: Spectrum {
+                route: Route::Svd,
+                s,
+                vt,
+                unreached: Array1::zeros(targets.ncols()),
+                c,
+                frame,
+            },
+            constant,
             u,
-            residual,
-            free,
-        })
+        };
+        if !spanned {
+            rows.residual = rows.off_span(targets);
+            rows.measure_freedom();
+            rows.spectrum.unreached = squares(rows.residual.view());
+        }
+        Ok(rows)
+    }
+
+    /// The part of each column (one entry per row of the problem) that is orthogonal to $U$ and
+    /// to the intercept. Twice, as the first pass leaves rounding errors of the size of what it
+    /// took away (Parlett's "twice is enough").
+    pub(crate) fn off_span(&self, mut columns: Array2<A>) -> Array2<A> {
+        let constant = self.constant.view().insert_axis(Axis(1));
+        for _ in 0..2 {
+            let shares = A::product(self.u.t(), columns.view());
+            columns -= &A::product(self.u.view(), shares.view());
+            let shares = A::product(constant.t(), columns.view());
+            columns -= &A::product(constant, shares.view());
+        }
+        columns
+    }
+
+    /// Fills [`free`](Self::free), and mends [`residual`](Self::residual) where it is small
+    /// because the row determines its own fit.
+    fn measure_freedom(&mut self) {
+        let u = &self.u;
+        self.free = Array1::from_shape_fn(u.nrows(), |i| {
+            A::one() - self.constant[i].powi(2) - u.row(i).dot(&u.row(i))
+        });
+        // The subtraction above has an error of epsilon. Where its result is small, take the
+        // squared norm of the part of the row's unit vector that is left over instead: its error
+        // is epsilon times its root. There are at most about `neurons` such rows.
+        let coarse = A::epsilon().sqrt().sqrt();
+        let close: Vec<usize> = (0..u.nrows()).filter(|&i| self.free[i] < coarse).collect();
+        let noise = rounding::<A>(u.nrows(), self.spectrum.vt.ncols());
+        for block in close.chunks(64) {
+            let mut units = Array2::zeros((u.nrows(), block.len()));
+            for (column, &row) in block.iter().enumerate() {
+                units[[row, column]] = A::one();
+            }
+            let left = self.off_span(units);
+            let mended = A::product(left.t(), self.residual.view());
+            for (column, &row) in block.iter().enumerate() {
+                let own = left.column(column);
+                let own = own.dot(&own);
+                if own.sqrt() <= noise {
+                    self.free[row] = A::zero();
+                    self.residual.row_mut(row).fill(A::zero());
+                } else {
+                    self.free[row] = own;
+                    self.residual.row_mut(row).assign(&mended.row(column));
+                }
+            }
+        }
     }
 }
 
@@ -286,95 +328,24 @@ fn truncate<A: Scalar>(svd: Svd<A>, rows: usize) -> Svd<A> {
     }
 }
 
+/// $a / (a + b)$ for numbers that are not negative nor both 0, without leaving the range and
+/// without subtracting, so that a small share keeps its digits.
+fn share<A: Scalar>(a: A, b: A) -> A {
+    if a < b {
+        let ratio = a / b;
+        ratio / (A::one() + ratio)
+    } else {
+        (A::one() + b / a).recip()
+    }
+}
+
 /// Sum of squares of each column.
 fn squares<A: Scalar>(matrix: ArrayView2<'_, A>) -> Array1<A> {
     matrix.map_axis(Axis(0), |column| column.dot(&column))
 }
 
-fn prepare<A: Scalar>(problem: &LeastSquares<'_, A>) -> Prepared<A> {
-    let rows = problem.rows();
-    let hidden_scale = power_of_two(problem.hidden.iter());
-    let target_scale: Array1<A> = problem
-        .targets
-        .columns()
-        .into_iter()
-        .map(|column| power_of_two(column.iter()))
-        .collect();
-    let mut hidden = problem.hidden.mapv(|h| h / hidden_scale);
-    let mut targets = &problem.targets / &target_scale;
-
-    // Largest weight 1, so that 1e300 and 1e-300 are as good as 1.
-    let weight_scale = problem.weights.map_or(A::one(), |weights| {
-        weights.iter().fold(A::zero(), |m, w| m.max(*w))
-    });
-    let weights = problem
-        .weights
-        .map(|weights| weights.mapv(|w| w / weight_scale));
-    let total = weights
-        .as_ref()
-        .map_or(A::from_f64(rows as f64), |w| w.sum());
-    let mean = |matrix: &Array2<A>| match &weights {
-        Some(weights) => weights.dot(matrix) / total,
-        None => matrix.sum_axis(Axis(0)) / total,
-    };
-    let mut intercept_leverage = Array1::zeros(rows);
-    let (mut hidden_mean, mut target_mean) = (
-        Array1::zeros(hidden.ncols()),
-        Array1::zeros(targets.ncols()),
-    );
-    if problem.intercept {
-        hidden_mean = mean(&hidden);
-        target_mean = mean(&targets);
-        hidden -= &hidden_mean;
-        targets -= &target_mean;
-        intercept_leverage.fill(A::one() / total);
-        if let Some(weights) = &weights {
-            intercept_leverage *= weights;
-        }
-    }
-    if let Some(weights) = &weights {
-        let roots = weights.mapv(A::sqrt).insert_axis(Axis(1));
-        hidden *= &roots;
-        targets *= &roots;
-    }
-    hidden_mean.mapv_inplace(|m| m * hidden_scale);
-    target_mean *= &target_scale;
-    let weighted_rows = weights.as_ref().map_or(rows, |weights| {
-        weights.iter().filter(|w| **w > A::zero()).count()
-    });
-    let frame = Frame {
-        rows,
-        weighted_rows,
-        intercept: problem.intercept,
-        weight_scale,
-        total_weight: total,
-        hidden_mean,
-        target_mean,
-        hidden_scale,
-        target_scale,
-    };
-    Prepared {
-        hidden,
-        targets,
-        intercept_leverage,
-        frame,
-    }
-}
-
-/// The power of two just above the largest magnitude (so dividing by it rounds nothing), or 1 for
-/// all zeros.
-fn power_of_two<'a, A: Scalar>(values: impl Iterator<Item = &'a A>) -> A {
-    let largest = values.fold(A::zero(), |m, v| m.max(v.abs()));
-    if largest == A::zero() {
-        return A::one();
-    }
-    // log2 of a subnormal is fine; 2^1024 is not, hence the bounds of a normal power.
-    let lowest = A::min_positive_value().log2();
-    let exponent = largest.log2().floor().max(lowest).min(-lowest - A::one());
-    A::from_f64(2.0).powf(exponent)
-}
-
-fn norm<A: Scalar>(column: ArrayView1<'_, A>) -> f64 {
+/// Euclidean norm, in range wherever the result is.
+pub(super) fn norm<A: Scalar>(column: ArrayView1<'_, A>) -> f64 {
     let largest = column.iter().fold(0.0_f64, |m, v| m.max(v.as_f64().abs()));
     if largest == 0.0 {
         return 0.0;

@@ -1,0 +1,58 @@
+//! The paper's protocol on the 61 materials of the stand-in, with one factorisation per fold for
+//! all materials together against one per fold and material.
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use elm::ElmParams;
+use elm::solve::PseudoInverse;
+use elm_brdf::features::Features;
+use elm_brdf::link::Link;
+use elm_brdf::model::BrdfParams;
+use elm_brdf::protocol::{Folds, cross_validate};
+use elm_datasets::{Invalid, MaterialId, Measurements, synthetic};
+
+fn paper() -> BrdfParams {
+    BrdfParams {
+        features: Features::Paper,
+        link: Link::Identity,
+        network: ElmParams::new(50)
+            .solver(PseudoInverse::default())
+            .intercept(false)
+            .seed(1),
+    }
+}
+
+fn scores(data: &Measurements, folds: &Folds) -> usize {
+    cross_validate(&paper(), data, folds, |_, _| {}).map_or(0, |scores| scores.len())
+}
+
+fn reproduce(criterion: &mut Criterion) {
+    let all: Vec<MaterialId> = MaterialId::all().collect();
+    let together = synthetic::measurements(1, &all, Invalid::Clamp);
+    let apart: Vec<Measurements> = all
+        .iter()
+        .map(|&id| synthetic::measurements(1, &[id], Invalid::Clamp))
+        .collect();
+    let Ok(folds) = Folds::new(together.directions.len(), 10, 1) else {
+        return;
+    };
+
+    let mut group = criterion.benchmark_group("reproduce");
+    group.throughput(Throughput::Elements(all.len() as u64));
+    group.bench_function("all materials together", |bencher| {
+        bencher.iter(|| scores(black_box(&together), &folds));
+    });
+    group.bench_function("each material by itself", |bencher| {
+        bencher.iter(|| {
+            apart
+                .iter()
+                .map(|one| scores(black_box(one), &folds))
+                .sum::<usize>()
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, reproduce);
+criterion_main!(benches);

@@ -1,0 +1,153 @@
+//! Other people's ways to a reflectance model, fitted as well as they can be, to be judged on the
+//! same folds as a network: winning against anything less would mean nothing.
+//!
+//! | model | what it knows of reflectance | stored numbers |
+//! |---|---|---|
+//! | [`Analytic`]: Lambert to GGX on Oren-Nayar, Lafortune | a formula | 1 to 7 |
+//! | [`Koenderink`] of order 2 and 8 | isotropy, reciprocity | 5, 55 |
+//! | [`Neighbours`]: nearest, inverse distance | inputs | the measurements |
+//! | [`RadialBasis`]: thin plate, cubic | inputs, smoothness | the measurements |
+//! | [`GaussianProcess`] | inputs, smoothness of each | the measurements |
+//!
+//! Every one implements [`Fit`], treats each channel by itself (so none pools materials), shares
+//! factorisations between channels, and returns a [`Brdf`](crate::brdf::Brdf) that is finite, not
+//! negative, and 0 where light or viewer is at or below the horizon.
+//!
+//! ```
+//! use elm_brdf::protocol::{Folds, cross_validate};
+//! use elm_brdf::reference::{Analytic, GaussianProcess};
+//! use elm_datasets::{Invalid, MaterialId, synthetic};
+//!
+//! let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
+//! let folds = Folds::new(data.directions.len(), 5, 1)?;
+//! let rmse = |method| -> elm_brdf::Result<f64> {
+//!     let scores = cross_validate(method, &data, &folds, |_, _| {})?;
+//!     Ok(scores[0].channels[0].held_out.rmse)
+//! };
+//! assert!(rmse(&Analytic::GgxOrenNayar)? < rmse(&Analytic::Lambert)?);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod analytic;
+mod gaussian_process;
+mod inputs;
+mod kernel;
+mod koenderink;
+mod neighbours;
+mod radial;
+
+use elm::solve::Ridge;
+
+pub use analytic::{Analytic, AnalyticModel, Shape};
+pub use gaussian_process::{Covariance, GaussianProcess};
+pub use koenderink::Koenderink;
+pub use neighbours::Neighbours;
+pub use radial::{Radial, RadialBasis, Smoothing};
+
+use crate::brdf::Fit;
+use crate::features::Features;
+use crate::link::Link;
+
+/// A method with the words that a table needs.
+pub struct Reference {
+    /// The model's name.
+    pub name: String,
+    /// Its inputs, where it is a regression over a set of them.
+    pub features: Option<Features>,
+    /// Its target, where it has a choice.
+    pub link: Option<Link>,
+    /// The method.
+    pub method: Box<dyn Fit>,
+}
+
+/// Every reference: the analytic models, Koenderink's basis, and the interpolators on the paper's
+/// inputs and target, on the inputs and target that suit them best, and, for those that gain by
+/// it, on reciprocal inputs.
+#[must_use]
+pub fn all() -> Vec<Reference> {
+    with_candidates(GaussianProcess::CANDIDATES)
+}
+
+/// The same with so many candidates for the length scales of Gaussian processes.
+fn with_candidates(candidates: usize) -> Vec<Reference> {
+    let mut all: Vec<Reference> = Analytic::ALL
+        .into_iter()
+        .map(|model| Reference {
+            name: model.name().to_owned(),
+            features: None,
+            link: None,
+            method: Box::new(model),
+        })
+        .collect();
+    all.extend([2, 8].map(|order| Reference {
+        name: format!("koenderink-{order}"),
+        features: None,
+        link: None,
+        // Order 8 overfits without: 55 coefficients, some 185 measurements.
+        method: Box::new(Koenderink {
+            order,
+            solver: Ridge::leave_one_out().into(),
+        }),
+    }));
+    for (features, link) in [
+        (Features::Paper, Link::Identity),
+        (Features::Paper, Link::default_log()),
+        (Features::Cosines, Link::default_log()),
+        (Features::ReciprocalCosines, Link::default_log()),
+    ] {
+        all.extend(interpolators(features, link, candidates));
+    }
+    all
+}
+
+fn interpolators(features: Features, link: Link, candidates: usize) -> Vec<Reference> {
+    let neighbours = |count| -> Box<dyn Fit> {
+        Box::new(Neighbours {
+            features,
+            link,
+            count,
+        })
+    };
+    let radial = |radial, smoothing| -> Box<dyn Fit> {
+        Box::new(RadialBasis {
+            features,
+            link,
+            radial,
+            smoothing,
+        })
+    };
+    let methods = [
+        ("nearest", neighbours(1)),
+        ("inverse-distance-5", neighbours(5)),
+        ("inverse-distance-all", neighbours(usize::MAX)),
+        ("thin-plate", radial(Radial::ThinPlate, Smoothing::Exact)),
+        (
+            "thin-plate-smoothed",
+            radial(Radial::ThinPlate, Smoothing::LeaveOneOut),
+        ),
+        ("cubic", radial(Radial::Cubic, Smoothing::Exact)),
+        (
+            "cubic-smoothed",
+            radial(Radial::Cubic, Smoothing::LeaveOneOut),
+        ),
+        (
+            "gaussian-process",
+            Box::new(GaussianProcess {
+                candidates,
+                ..GaussianProcess::new(features, link)
+            }) as Box<dyn Fit>,
+        ),
+    ];
+    methods
+        .into_iter()
+        .map(|(name, method)| Reference {
+            name: name.to_owned(),
+            features: Some(features),
+            link: Some(link),
+            method,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,427 @@
+//! Fitting to rows that arrive in pieces: online, out of core, or from many machines.
+//!
+//! ```
+//! use elm::{Accumulator, ElmParams, Scaler};
+//! use elm::solve::Ridge;
+//! use ndarray::{Array2, s};
+//!
+//! let x = Array2::from_shape_fn((300, 2), |(i, j)| ((i * (j + 3)) as f64 * 0.1).sin());
+//! let t = x.map_axis(ndarray::Axis(1), |row| row[0] * row[1]);
+//! let params = ElmParams::new(40).solver(Ridge::gcv()).check()?;
+//!
+//! // Two workers, each with half of the rows, one of them in two pieces.
+//! let mut one = Accumulator::with_scaler(&params, Scaler::measured(&x)?, 1)?;
+//! let mut other = one.clone();
+//! one.push(&x.slice(s![..100, ..]), &t.slice(s![..100]))?;
+//! one.push(&x.slice(s![100..150, ..]), &t.slice(s![100..150]))?;
+//! other.push(&x.slice(s![150.., ..]), &t.slice(s![150..]))?;
+//! one.merge(&other)?;
+//!
+//! let model = one.fit()?;
+//! let batch = params.fit(&x, &t)?;
+//! assert!((model.predict(&x)? - batch.predict(&x)?).iter().all(|d| d.abs() < 1e-9));
+//! # Ok::<(), elm::Error>(())
+//! ```
+//!
+//! What is kept of the rows is the triangle $R$ of the QR factorisation of $[1, H, T]$ (weighted),
+//! and a block of rows that have not entered it yet: memory of order (neurons + outputs)², however
+//! many rows there are. New rows are put under $R$ and the stack is factorised again; so are two
+//! triangles that are merged (sequential and tree-shaped TSQR: Demmel, Grigori, Hoemmen and
+//! Langou, Communication-optimal parallel and sequential QR, 2012). Orthogonal transformations add
+//! errors of epsilon, not of the condition number squared as the sums of $H^T H$ that online ELMs
+//! usually keep (Liang et al., OS-ELM, 2006): chunking, order and merging change the output weights
+//! by no more than condition times epsilon.
+//!
+//! Eliminating the column of ones first centres the rest, so that $R$ without its first row is the
+//! triangle of the centred problem, and the intercept is as unpenalised as in a batch fit.
+
+mod parts;
+mod spectrum;
+
+use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2, Axis, s};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+use crate::hidden::{Biases, HiddenLayer};
+use crate::linalg::Triangular;
+use crate::model::{CheckedParams, Elm, Targets, design};
+use crate::scalar::Scalar;
+use crate::scaler::Scaler;
+use crate::solve::frame::power_of_two;
+use crate::solve::{Solver, check_length, check_matrix, check_room, check_weights};
+
+/// Rows in, a triangle kept; see the [module](self).
+///
+/// The random layer and the standardisation of inputs are fixed when it is made. The solver is that
+/// of the parameters, except that leave-one-out, the default, needs the rows: an accumulator
+/// chooses by generalised cross-validation in its place, so that
+/// [`Diagnosis::leave_one_out`](crate::solve::Diagnosis::leave_one_out) is `None`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "", try_from = "parts::Parts<A>")]
+pub struct Accumulator<A: Scalar> {
+    scaler: Option<Scaler<A>>,
+    hidden: HiddenLayer<A>,
+    direct_links: bool,
+    solver: Solver,
+    intercept: bool,
+    inputs: usize,
+    outputs: usize,
+    rows: u64,
+    /// Rows whose weight is not 0.
+    weighted_rows: u64,
+    /// The upper triangle, square; columns are the ones (with an intercept), neurons, outputs.
+    triangle: Array2<A>,
+    /// Powers of two that the triangle's columns were divided by.
+    scales: Array1<A>,
+    /// Weighted rows that are not in the triangle yet, in the columns of the triangle, unscaled.
+    pending: Vec<A>,
+}
+
+impl<A: Scalar> Accumulator<A> {
+    /// Draws the random layer, with inputs standardised by `scaler`, which must be the same for
+    /// all accumulators that are to be merged.
+    ///
+    /// # Errors
+    /// [`Error::Conflict`] when the parameters switch standardisation off, lay biases on the data
+    /// or ask for the solver [`Inverse`](crate::solve::Inverse); [`Error::Parameter`] for 0
+    /// outputs; [`Error::Shape`] for input scales; [`Error::TooLarge`].
+    pub fn with_scaler(
+        params: &CheckedParams<A>,
+        scaler: Scaler<A>,
+        outputs: usize,
+    ) -> Result<Self> {
+        if !params.standardises() {
+            return Err(Error::Conflict {
+                first: "standardise(false)",
+                second: "a scaler",
+            });
+        }
+        if params.biases() == Biases::OnData {
+            return Err(Error::Conflict {
+                first: "biases on the data",
+                second: "a layer drawn before there are rows",
+            });
+        }
+        let none = Array2::zeros((0, scaler.mean().len()));
+        Self::new(params, Some(scaler), none.view(), outputs)
+    }
+
+    /// Draws the random layer for rows like those of `x`, shape (rows, inputs): inputs are
+    /// standardised by their means and deviations, and biases laid on them, where the parameters
+    /// say so. The rows are not pushed. One sample gives accumulators that can be merged.
+    ///
+    /// # Errors
+    /// [`Error::Empty`] and [`Error::NotFinite`] for `x`, and those of
+    /// [`with_scaler`](Self::with_scaler).
+    pub fn from_sample(
+        params: &CheckedParams<A>,
+        x: &ArrayRef2<A>,
+        outputs: usize,
+    ) -> Result<Self> {
+        check_matrix("inputs", x.view())?;
+        let scaler = params.standardises().then(|| Scaler::measure(x.view()));
+        let scaled = scaler.as_ref().map(|scaler| scaler.transform(x.view()));
+        let x = scaled.as_ref().map_or(x.view(), |scaled| scaled.view());
+        Self::new(params, scaler, x, outputs)
+    }
+
+    fn new(
+        params: &CheckedParams<A>,
+        scaler: Option<Scaler<A>>,
+        sample: ArrayView2<'_, A>,
+        outputs: usize,
+    ) -> Result<Self> {
+        if outputs == 0 {
+            return Err(Error::Parameter {
+                name: "outputs",
+                value: 0.0,
+                expected: "at least 1",
+            });
+        }
+        let solver = params.solver();
+        if matches!(solver, Solver::Inverse(_)) {
+            return Err(Error::Conflict {
+                first: "the solver 'inverse'",
+                second: "an accumulator",
+            });
+        }
+        let hidden = params.layer(sample)?;
+        let inputs = hidden.inputs();
+        let direct_links = params.links_directly();
+        let links = if direct_links { inputs } else { 0 };
+        let intercept = params.has_intercept();
+        let columns = usize::from(intercept)
+            .saturating_add(hidden.neurons())
+            .saturating_add(links)
+            .saturating_add(outputs);
+        // Where the triangle fits, so does the block of rows.
+        check_room(
+            "the accumulator",
+            columns,
+            columns.saturating_mul(BLOCK + 2),
+        )?;
+        Ok(Self {
+            scaler,
+            hidden,
+            direct_links,
+            solver: solver.without_rows(),
+            intercept,
+            inputs,
+            outputs,
+            rows: 0,
+            weighted_rows: 0,
+            triangle: Array2::zeros((columns, columns)),
+            scales: Array1::ones(columns),
+            pending: Vec::new(),
+        })
+    }
+
+    /// Number of rows so far.
+    #[must_use]
+    pub fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    /// Takes in rows: `x` has shape (rows, inputs), `t` (rows, outputs), or (rows) for one output.
+    /// No rows is fine.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] and [`Error::NotFinite`] for the data, [`Error::Overflow`] for values
+    /// beyond the range once weighted. After an error nothing has been taken in.
+    pub fn push<T: Targets<A>>(&mut self, x: &ArrayRef2<A>, t: &T) -> Result<()> {
+        self.push_rows(x.view(), t.as_matrix(), None)
+    }
+
+    /// As [`push`](Self::push), with a weight for the squared residual of each row.
+    ///
+    /// # Errors
+    /// Those of [`push`](Self::push); [`Error::Shape`] and [`Error::Parameter`] for weights, of
+    /// which those of one call may all be 0.
+    pub fn push_weighted<T: Targets<A>>(
+        &mut self,
+        x: &ArrayRef2<A>,
+        t: &T,
+        weights: &ArrayRef1<A>,
+    ) -> Result<()> {
+        self.push_rows(x.view(), t.as_matrix(), Some(weights.view()))
+    }
+
+    fn push_rows(
+        &mut self,
+        x: ArrayView2<'_, A>,
+        t: ArrayView2<'_, A>,
+        weights: Option<ArrayView1<'_, A>>,
+    ) -> Result<()> {
+        check_length("inputs", x.ncols(), self.inputs)?;
+        check_length("outputs", t.ncols(), self.outputs)?;
+        check_length("rows of targets", t.nrows(), x.nrows())?;
+        if let Some(weights) = weights {
+            check_weights(weights, x.nrows())?;
+        }
+        if x.nrows() == 0 {
+            return Ok(());
+        }
+        check_matrix("inputs", x)?;
+        check_matrix("targets", t)?;
+        let before = (self.pending.len(), self.rows, self.weighted_rows);
+        if self.pending.len() / self.columns() + x.nrows() >= self.block() {
+            // The triangle will change: an error after that must leave no trace.
+            let mut next = self.clone();
+            next.take_in(x, t, weights)?;
+            *self = next;
+            return Ok(());
+        }
+        self.take_in(x, t, weights).inspect_err(|_| {
+            self.pending.truncate(before.0);
+            (self.rows, self.weighted_rows) = (before.1, before.2);
+        })
+    }
+
+    /// Adds checked rows, block by block.
+    fn take_in(
+        &mut self,
+        x: ArrayView2<'_, A>,
+        t: ArrayView2<'_, A>,
+        weights: Option<ArrayView1<'_, A>>,
+    ) -> Result<()> {
+        let block = self.block();
+        for start in (0..x.nrows()).step_by(block) {
+            let range = s![start..x.nrows().min(start + block), ..];
+            let x = x.slice(range);
+            let scaled = self.scaler.as_ref().map(|scaler| scaler.transform(x));
+            let x = scaled.as_ref().map_or(x, |scaled| scaled.view());
+            let h = design(&self.hidden, self.direct_links, x);
+            check_matrix("hidden-layer matrix", h.view())?;
+            for (row, (h, t)) in h.rows().into_iter().zip(t.slice(range).rows()).enumerate() {
+                let weight = weights.map_or(A::one(), |weights| weights[start + row]);
+                self.rows += 1;
+                if weight == A::zero() {
+                    continue;
+                }
+                self.weighted_rows += 1;
+                let root = weight.sqrt();
+                if self.intercept {
+                    self.pending.push(root);
+                }
+                for &value in h.iter().chain(t) {
+                    self.pending.push(value * root);
+                    if !(value * root).is_finite() {
+                        return Err(OVERFLOW);
+                    }
+                }
+                if self.pending.len() == block * self.columns() {
+                    self.flush()?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes in all that `other` has taken in.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] naming what differs: the random layer, the scaler, the outputs, or the
+    /// settings of the solve.
+    pub fn merge(&mut self, other: &Self) -> Result<()> {
+        for (what, same) in [
+            ("random layers", self.hidden == other.hidden),
+            ("scalers of inputs", self.scaler == other.scaler),
+            ("numbers of outputs", self.outputs == other.outputs),
+            ("direct links", self.direct_links == other.direct_links),
+            ("intercepts", self.intercept == other.intercept),
+            ("solvers", self.solver == other.solver),
+        ] {
+            if !same {
+                return Err(Error::Mismatch { what });
+            }
+        }
+        let (mut next, mut other) = (self.clone(), other.clone());
+        next.flush()?;
+        other.flush()?;
+        next.absorb(&(&other.triangle * &other.scales))?;
+        next.rows += other.rows;
+        next.weighted_rows += other.weighted_rows;
+        *self = next;
+        Ok(())
+    }
+
+    /// Solves for the output weights of all rows so far. More rows may be pushed afterwards.
+    ///
+    /// # Errors
+    /// [`Error::Empty`] without rows of positive weight, and those of [`Solver::solve`].
+    pub fn fit(&self) -> Result<Elm<A>> {
+        if self.weighted_rows == 0 {
+            return Err(Error::Empty {
+                what: "accumulator",
+                rows: 0,
+                columns: self.columns(),
+            });
+        }
+        let mut all = self.clone();
+        all.flush()?;
+        let solution = all.solver.solve_spectrum(&all.spectrum()?)?;
+        Ok(Elm::assemble(
+            all.scaler,
+            all.hidden,
+            all.direct_links,
+            solution,
+        ))
+    }
+
+    fn columns(&self) -> usize {
+        self.triangle.ncols()
+    }
+
+    /// Rows that are factorised together.
+    fn block(&self) -> usize {
+        BLOCK * self.columns()
+    }
+
+    /// Moves pending rows into the triangle.
+    fn flush(&mut self) -> Result<()> {
+        let rows = self.pending.len() / self.columns();
+        if rows == 0 {
+            return Ok(());
+        }
+        let pending = std::mem::take(&mut self.pending);
+        let block =
+            ArrayView2::from_shape((rows, self.columns()), &pending).map_err(|_| OVERFLOW)?;
+        self.absorb(&block)
+    }
+
+    /// Factorises the triangle with unscaled rows under it.
+    fn absorb(&mut self, rows: &ArrayRef2<A>) -> Result<()> {
+        let columns = self.columns();
+        if !rows.iter().all(|v| v.is_finite()) {
+            return Err(OVERFLOW);
+        }
+        let mut both = Array2::zeros((columns + rows.nrows(), columns));
+        for (column, scale) in self.scales.iter_mut().enumerate() {
+            let largest = rows
+                .column(column)
+                .iter()
+                .fold(A::zero(), |m: A, v| m.max(v.abs()));
+            let fresh = self.triangle.column(column).iter().all(|v| *v == A::zero());
+            let wanted = power_of_two(largest);
+            // Grows with the data; a power of two rounds nothing.
+            let factor = if largest > A::zero() && (fresh || wanted > *scale) {
+                let factor = *scale / wanted;
+                *scale = wanted;
+                factor
+            } else {
+                A::one()
+            };
+            let mut target = both.column_mut(column);
+            let (mut top, mut bottom) = target.view_mut().split_at(Axis(0), columns);
+            if !fresh {
+                top.assign(&(&self.triangle.column(column) * factor));
+            }
+            bottom.assign(&rows.column(column).mapv(|v| v / *scale));
+        }
+        let nothing = Array2::zeros((both.nrows(), 0));
+        let Triangular { r, .. } = A::triangularise(both.view(), nothing.view())?;
+        if !r.iter().all(|v| v.is_finite()) {
+            return Err(OVERFLOW);
+        }
+        self.triangle = r;
+        Ok(())
+    }
+}
+
+/// Rows in a block, in units of the triangle's size: the triangle is factorised again with every
+/// block, which costs a quarter more than one factorisation of all rows.
+const BLOCK: usize = 4;
+
+const OVERFLOW: Error = Error::Overflow {
+    what: "an accumulated value",
+};
+
+impl<A: Scalar> CheckedParams<A> {
+    /// Fits to chunks of rows that never stand in memory together: `chunks` yields inputs and
+    /// targets as [`fit`](Self::fit) takes them. Inputs are standardised by the **first** chunk,
+    /// which should be like the others. Leave-one-out is replaced; see [`Accumulator`].
+    ///
+    /// # Errors
+    /// The first error of `chunks`, [`Error::Empty`] when there are none, and those of
+    /// [`Accumulator::push`] and [`Accumulator::fit`].
+    pub fn fit_chunks<E: From<Error>>(
+        &self,
+        chunks: impl IntoIterator<Item = Result<(Array2<A>, Array2<A>), E>>,
+    ) -> Result<Elm<A>, E> {
+        let mut accumulator: Option<Accumulator<A>> = None;
+        for chunk in chunks {
+            let (x, t) = chunk?;
+            let accumulator = match &mut accumulator {
+                Some(accumulator) => accumulator,
+                none => none.insert(Accumulator::from_sample(self, &x, t.ncols())?),
+            };
+            accumulator.push(&x, &t)?;
+        }
+        let nothing = Error::Empty {
+            what: "chunks",
+            rows: 0,
+            columns: 0,
+        };
+        Ok(accumulator.ok_or(nothing)?.fit()?)
+    }
+}

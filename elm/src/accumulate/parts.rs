@@ -1,0 +1,88 @@
+//! An accumulator from outside, before its parts are known to fit together.
+
+use ndarray::{Array1, Array2};
+use serde::Deserialize;
+
+use super::{Accumulator, BLOCK, OVERFLOW};
+use crate::error::{Error, Result};
+use crate::hidden::HiddenLayer;
+use crate::model::check_layer;
+use crate::scalar::Scalar;
+use crate::scaler::Scaler;
+use crate::solve::{Solver, check_length, check_matrix};
+
+/// The fields of [`Accumulator`].
+#[derive(Deserialize)]
+#[serde(bound = "")]
+pub(super) struct Parts<A: Scalar> {
+    scaler: Option<Scaler<A>>,
+    hidden: HiddenLayer<A>,
+    direct_links: bool,
+    solver: Solver,
+    intercept: bool,
+    inputs: usize,
+    outputs: usize,
+    rows: u64,
+    weighted_rows: u64,
+    triangle: Array2<A>,
+    scales: Array1<A>,
+    pending: Vec<A>,
+}
+
+impl<A: Scalar> TryFrom<Parts<A>> for Accumulator<A> {
+    type Error = Error;
+
+    fn try_from(parts: Parts<A>) -> Result<Self> {
+        check_layer(&parts.hidden, parts.scaler.as_ref())?;
+        check_length("inputs", parts.inputs, parts.hidden.inputs())?;
+        parts.solver.check()?;
+        check_matrix("triangle", parts.triangle.view())?;
+        let links = if parts.direct_links { parts.inputs } else { 0 };
+        let own = usize::from(parts.intercept) + parts.hidden.neurons() + links;
+        let columns = parts.triangle.ncols();
+        // Subtracted, as the sum might overflow.
+        check_length("outputs", columns.saturating_sub(own), parts.outputs)?;
+        check_length("rows of the triangle", parts.triangle.nrows(), columns)?;
+        check_length("scales", parts.scales.len(), columns)?;
+        if parts.outputs == 0 || parts.pending.len() >= BLOCK * columns * columns {
+            return Err(Error::Shape {
+                what: "pending rows",
+                expected: 0,
+                found: parts.pending.len() / columns,
+            });
+        }
+        check_length("values in a pending row", parts.pending.len() % columns, 0)?;
+        let good = |scale: &A| scale.is_finite() && *scale > A::zero();
+        if !(parts.scales.iter().all(good) && parts.pending.iter().all(|v| v.is_finite())) {
+            return Err(OVERFLOW);
+        }
+        let Parts {
+            scaler,
+            hidden,
+            direct_links,
+            solver,
+            intercept,
+            inputs,
+            outputs,
+            rows,
+            weighted_rows,
+            triangle,
+            scales,
+            pending,
+        } = parts;
+        Ok(Self {
+            scaler,
+            hidden,
+            direct_links,
+            solver,
+            intercept,
+            inputs,
+            outputs,
+            rows,
+            weighted_rows,
+            triangle,
+            scales,
+            pending,
+        })
+    }
+}

@@ -1,0 +1,97 @@
+//! From the triangle to the problem that a batch fit would have prepared.
+
+use ndarray::{Array1, ArrayView1, Axis, s};
+
+use super::Accumulator;
+use crate::error::Result;
+use crate::scalar::Scalar;
+use crate::solve::frame::{Frame, Prepared, power_of_two};
+use crate::solve::spectrum::{Spectrum, rounding};
+
+impl<A: Scalar> Accumulator<A> {
+    /// The problem in the coordinates of its singular vectors, as a batch fit has it.
+    pub(super) fn spectrum(&self) -> Result<Spectrum<A>> {
+        let extra = usize::from(self.intercept);
+        let neurons = self.columns() - self.outputs - extra;
+        let (hidden, targets) = (extra..extra + neurons, extra + neurons..);
+        let rows = usize::try_from(self.rows).unwrap_or(usize::MAX);
+        let level = rounding::<A>(rows, self.columns());
+
+        // Neurons share one scale, so that the singular values are those of the whole matrix.
+        let scales = self.scales.slice(s![hidden.clone()]);
+        let mut hidden_scale = scales
+            .iter()
+            .fold(A::min_positive_value(), |m, s| m.max(*s));
+        let mut h = self
+            .triangle
+            .slice(s![hidden.clone(), hidden.clone()])
+            .to_owned();
+        h *= &(&scales / hidden_scale);
+        let mut target_scale = self.scales.slice(s![targets.clone()]).to_owned();
+        let mut t = self
+            .triangle
+            .slice(s![hidden.clone(), targets.clone()])
+            .to_owned();
+        let mut rest = self
+            .triangle
+            .slice(s![targets.clone(), targets.clone()])
+            .to_owned();
+        let (mut hidden_mean, mut target_mean) =
+            (Array1::zeros(neurons), Array1::zeros(self.outputs));
+        if self.intercept {
+            let first = self.triangle.row(0);
+            let mean =
+                |column: usize| first[column] / first[0] * (self.scales[column] / self.scales[0]);
+            hidden_mean = hidden.clone().map(mean).collect();
+            target_mean = (extra + neurons..self.columns()).map(mean).collect();
+            // What centring leaves of a constant is rounding, and would pass for a feature.
+            for (column, place) in hidden.clone().enumerate() {
+                let left = self.triangle.slice(s![1..=place, place]);
+                if left.dot(&left).sqrt() <= level * first[place].abs() {
+                    h.column_mut(column).fill(A::zero());
+                }
+            }
+            for (output, place) in (extra + neurons..self.columns()).enumerate() {
+                let left = self.triangle.slice(s![1..=place, place]);
+                if left.dot(&left).sqrt() <= level * first[place].abs() {
+                    t.column_mut(output).fill(A::zero());
+                    rest.column_mut(output).fill(A::zero());
+                }
+            }
+            // A large constant is gone now, and what is left may be small.
+            let largest =
+                |values: ArrayView1<'_, A>| values.iter().fold(A::zero(), |m: A, v| m.max(v.abs()));
+            let size = h.columns().into_iter().map(largest).fold(A::zero(), A::max);
+            let shrunk = power_of_two(size);
+            h.mapv_inplace(|v| v / shrunk);
+            hidden_scale *= shrunk;
+            for (output, scale) in target_scale.iter_mut().enumerate() {
+                let size = largest(t.column(output)).max(largest(rest.column(output)));
+                let shrunk = power_of_two(size);
+                t.column_mut(output).mapv_inplace(|v| v / shrunk);
+                rest.column_mut(output).mapv_inplace(|v| v / shrunk);
+                *scale *= shrunk;
+            }
+        }
+        let frame = Frame {
+            rows,
+            weighted_rows: usize::try_from(self.weighted_rows).unwrap_or(usize::MAX),
+            intercept: self.intercept,
+            root_weights: Array1::zeros(0),
+            weight_scale: A::one(),
+            total_weight: A::one(),
+            hidden_mean,
+            target_mean,
+            hidden_scale,
+            target_scale,
+        };
+        Spectrum::from_triangle(
+            Prepared {
+                hidden: h,
+                targets: t,
+                frame,
+            },
+            rest.map_axis(Axis(0), |column| column.dot(&column)),
+        )
+    }
+}

@@ -1,0 +1,223 @@
+//! What is done to a problem before it is factorised, and how its answer is brought back.
+
+use ndarray::{Array1, Array2, ArrayView2, Axis, Zip};
+
+use super::LeastSquares;
+use crate::scalar::Scalar;
+
+/// The scales and means that were taken out of a problem.
+#[derive(Debug, Clone)]
+pub(crate) struct Frame<A: Scalar> {
+    pub(crate) rows: usize,
+    /// Rows whose weight is not 0.
+    pub(crate) weighted_rows: usize,
+    pub(crate) intercept: bool,
+    /// Square roots of the row weights, the largest being 1; without weights all are 1.
+    pub(crate) root_weights: Array1<A>,
+    /// The largest row weight, which the others were divided by.
+    pub(crate) weight_scale: A,
+    /// The sum of the weights after that.
+    pub(crate) total_weight: A,
+    pub(crate) hidden_mean: Array1<A>,
+    pub(crate) target_mean: Array1<A>,
+    /// Powers of two that the matrices were divided by.
+    pub(crate) hidden_scale: A,
+    pub(crate) target_scale: Array1<A>,
+}
+
+impl<A: Scalar> Frame<A> {
+    /// The unit vector that an intercept spans among the weighted rows,
+    /// $\sqrt{w_i / \sum w}$; all 0 without one.
+    pub(crate) fn constant_direction(&self) -> Array1<A> {
+        if self.intercept {
+            &self.root_weights / self.total_weight.sqrt()
+        } else {
+            Array1::zeros(self.rows)
+        }
+    }
+
+    /// Output weights of the scaled problem in the problem's own units.
+    pub(crate) fn restore(&self, mut beta: Array2<A>) -> Array2<A> {
+        for (mut column, &scale) in beta.columns_mut().into_iter().zip(&self.target_scale) {
+            column.mapv_inplace(|b| b * (scale / self.hidden_scale));
+        }
+        beta
+    }
+
+    /// The constant of each output that goes with these output weights.
+    pub(crate) fn constant(&self, beta: &Array2<A>) -> Array1<A> {
+        &self.target_mean - &self.hidden_mean.dot(beta)
+    }
+
+    /// A singular value in the problem's own units.
+    pub(crate) fn outer_singular_value(&self, s: A) -> f64 {
+        s.as_f64() * (self.hidden_scale.as_f64() * self.weight_scale.as_f64().sqrt())
+    }
+
+    /// Norms of (weighted) residuals in the problem's own units.
+    pub(crate) fn outer_residual_norms(&self, norms: impl Iterator<Item = f64>) -> Vec<f64> {
+        let root_weight = self.weight_scale.as_f64().sqrt();
+        norms
+            .zip(&self.target_scale)
+            .map(|(norm, scale)| norm * scale.as_f64() * root_weight)
+            .collect()
+    }
+
+    /// Whether this many singular vectors, with the intercept, reach every weighted row. What is
+    /// left of the targets is then rounding error, and leave-one-out would divide one rounding
+    /// error by another.
+    pub(crate) fn spanned_by(&self, rank: usize) -> bool {
+        rank + usize::from(self.intercept) >= self.weighted_rows
+    }
+}
+
+/// The problem with rows weighted, columns centred for the intercept, and everything scaled by
+/// powers of two into the middle of the floating-point range. Rows of weight 0 are 0.
+pub(crate) struct Prepared<A: Scalar> {
+    pub(crate) hidden: Array2<A>,
+    pub(crate) targets: Array2<A>,
+    pub(crate) frame: Frame<A>,
+}
+
+impl<A: Scalar> Prepared<A> {
+    pub(crate) fn new(problem: &LeastSquares<'_, A>) -> Self {
+        let rows = problem.rows();
+        // Largest weight 1, so that 1e300 and 1e-300 are as good as 1.
+        let weight_scale = problem.weights.map_or(A::one(), |weights| {
+            weights.iter().fold(A::zero(), |m, w| m.max(*w))
+        });
+        let weights = match &problem.weights {
+            Some(weights) => weights.mapv(|w| w / weight_scale),
+            None => Array1::ones(rows),
+        };
+        let total_weight = weights.sum();
+        let weighted_rows = weights.iter().filter(|w| **w > A::zero()).count();
+        let root_weights = weights.mapv(A::sqrt);
+
+        let largest = weighted_magnitudes(problem.hidden, &root_weights);
+        let mut hidden_scale = power_of_two(largest.iter().fold(A::zero(), |m, x| m.max(*x)));
+        let mut target_scale =
+            weighted_magnitudes(problem.targets, &root_weights).mapv_into(power_of_two);
+        let mut hidden = problem.hidden.mapv(|h| h / hidden_scale);
+        let mut targets = &problem.targets / &target_scale;
+        for (row, weight) in weights.iter().enumerate() {
+            // A row that is absent may hold anything, even what would overflow.
+            if *weight == A::zero() {
+                hidden.row_mut(row).fill(A::zero());
+                targets.row_mut(row).fill(A::zero());
+            }
+        }
+        let mut hidden_mean = Array1::zeros(hidden.ncols());
+        let mut target_mean = Array1::zeros(targets.ncols());
+        if problem.intercept {
+            hidden_mean = centre(&mut hidden, &weights, total_weight);
+            hidden_mean.mapv_inplace(|m| m * hidden_scale);
+            target_mean = centre(&mut targets, &weights, total_weight);
+            target_mean *= &target_scale;
+        }
+        if problem.weights.is_some() {
+            let roots = root_weights.view().insert_axis(Axis(1));
+            hidden *= &roots;
+            targets *= &roots;
+        }
+        if problem.intercept {
+            // A large constant column is gone now, and what is left may be small.
+            let shrunk = power_of_two(hidden.iter().fold(A::zero(), |m, x| m.max(x.abs())));
+            if shrunk < A::one() {
+                hidden.mapv_inplace(|h| h / shrunk);
+                hidden_scale *= shrunk;
+            }
+            for (mut column, scale) in targets.columns_mut().into_iter().zip(&mut target_scale) {
+                let shrunk = power_of_two(column.iter().fold(A::zero(), |m, x| m.max(x.abs())));
+                if shrunk < A::one() {
+                    column.mapv_inplace(|t| t / shrunk);
+                    *scale *= shrunk;
+                }
+            }
+        }
+        let frame = Frame {
+            rows,
+            weighted_rows,
+            intercept: problem.intercept,
+            root_weights,
+            weight_scale,
+            total_weight,
+            hidden_mean,
+            target_mean,
+            hidden_scale,
+            target_scale,
+        };
+        Self {
+            hidden,
+            targets,
+            frame,
+        }
+    }
+}
+
+/// For each column the largest $\sqrt{w_i} |a_{ij}|$.
+fn weighted_magnitudes<A: Scalar>(matrix: ArrayView2<'_, A>, roots: &Array1<A>) -> Array1<A> {
+    let mut largest = Array1::zeros(matrix.ncols());
+    for (row, &root) in matrix.rows().into_iter().zip(roots) {
+        Zip::from(&mut largest).and(row).for_each(|m: &mut A, &x| {
+            *m = m.max(root * x.abs());
+        });
+    }
+    largest
+}
+
+/// Subtracts each column's weighted mean and returns the means. A column whose values differ by
+/// no more than rounding becomes exactly 0: its noise would pass for a feature.
+fn centre<A: Scalar>(matrix: &mut Array2<A>, weights: &Array1<A>, total: A) -> Array1<A> {
+    // Weights lie in [0, 1], so this is 1 for every row that is there.
+    let largest = weighted_magnitudes(matrix.view(), &weights.mapv(A::ceil));
+    let mut mean = weights.dot(matrix) / total;
+    *matrix -= &mean;
+    // The sum over many rows has rounded; what it missed is the mean of what is left.
+    let missed = weights.dot(matrix) / total;
+    *matrix -= &missed;
+    mean += &missed;
+    for (mut column, &largest) in matrix.columns_mut().into_iter().zip(&largest) {
+        let bound = A::from_f64(4.0) * A::epsilon() * largest;
+        let varies = Zip::from(&column)
+            .and(weights)
+            .any(|x, w| *w > A::zero() && x.abs() > bound);
+        if !varies {
+            column.fill(A::zero());
+        }
+    }
+    mean
+}
+
+/// The power of two at or just below a magnitude (so that dividing by it rounds nothing), or 1
+/// for 0.
+pub(crate) fn power_of_two<A: Scalar>(magnitude: A) -> A {
+    if magnitude == A::zero() {
+        return A::one();
+    }
+    // log2 of a subnormal is fine; 2^1024 is not, hence the bounds of a normal power.
+    let lowest = A::min_positive_value().log2();
+    let exponent = magnitude.log2().floor().max(lowest).min(-lowest);
+    A::from_f64(2.0).powf(exponent)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn powers_of_two_are_exact_over_the_whole_range() {
+        for (magnitude, power) in [
+            (1.0, 1.0),
+            (1.999, 1.0),
+            (2.0, 2.0),
+            (0.75, 0.5),
+            (f64::MAX, 2.0_f64.powi(1022)),
+            (f64::MIN_POSITIVE, f64::MIN_POSITIVE),
+            (5e-324, f64::MIN_POSITIVE),
+            (0.0, 1.0),
+        ] {
+            assert_eq!(power_of_two(magnitude), power, "{magnitude:e}");
+        }
+    }
+}

@@ -1,0 +1,509 @@
+//! Validation in closed form: what a fit would predict for rows that it has not seen, for any
+//! division into folds, from the one factorisation of the full fit. No row is ever refitted.
+//!
+//! ```
+//! use elm::solve::{LeastSquares, Ridge};
+//! use elm::validate::{Validator, assign_folds};
+//! use ndarray::{Array2, array};
+//!
+//! let h = Array2::from_shape_fn((12, 3), |(i, j)| (i as f64 * 0.7 + j as f64).sin());
+//! let t = h.dot(&array![[1.0], [-2.0], [0.5]]) + 3.0;
+//! let validator = Validator::new(&LeastSquares::new(&h, &t)?.intercept(true))?;
+//! let folds = assign_folds(12, 4, 0)?;
+//! let path = validator.k_fold_path(&folds, &Ridge::candidates::<f64>())?;
+//! let held_out = validator.k_fold(&folds, &path.best())?;
+//! assert!(held_out.rmse()[0] < 1e-6);
+//! # Ok::<(), elm::Error>(())
+//! ```
+//!
+//! # How
+//! Leaving out the rows of a fold $F$ gives the same fit as giving each of them a parameter of its
+//! own (the mean-shift model), whose values are the held-out residuals $e_F$. Eliminating
+//! $\beta$ leaves $(I - S_{FF})\, e_F = r_F$ with $S$ the matrix that maps targets to fitted values
+//! and $r$ the residual of the full fit (Cook and Weisberg, Residuals and Influence in Regression,
+//! 1982, for one row $e_i = r_i / (1 - h_i)$). With singular vectors $U$ and shares $f$ held back
+//! by ridge,
+//! $$I - S_{FF} = \left(I - q q^T - U U^T\right)_{FF} + U_F \operatorname{diag}(f) U_F^T,$$
+//! a sum of two positive parts, which is how it is computed: $1 - h$ by subtraction has no digits
+//! left where a row is nearly interpolated. A fold with more rows than there are directions is
+//! solved in the coordinates of the directions instead, from the sum over all *other* rows.
+//!
+//! # What is and is not seen
+//! Ridge's $\lambda$ is relative to the largest singular value of **all** rows; every fold is
+//! fitted with that same absolute $\lambda$. When inputs were standardised on all rows, the mean
+//! and deviation of a held-out row's inputs have entered the hidden layer (its targets never do);
+//! so has a row's input in whatever else was derived from all inputs. That leak is of the order of
+//! one row's share in a mean, and it shrinks with the number of rows; protocols that forbid it
+//! standardise on the training rows of each fold and refit. Choosing $\lambda$ by a held-out score
+//! and then quoting that score as the error is the usual mild optimism of model selection.
+
+mod fold;
+
+use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis, Zip};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+use crate::error::{Error, Result};
+use crate::scalar::Scalar;
+use crate::solve::spectrum::{RowSpectrum, Spectrum, rounding};
+use crate::solve::{LeastSquares, Ridge, check_length};
+use fold::Fold;
+
+/// A least-squares problem, factorised once, ready to answer what it would predict without some
+/// of its rows.
+///
+/// Strengths are given as one relative $\lambda$ for all outputs or one for each; 0 stands for
+/// [`PseudoInverse`](crate::solve::PseudoInverse) with its default cut-off. All answers are those
+/// of refitting, up to rounding: about $\epsilon / \lambda$ where a row or fold nearly determines
+/// its own fit, and $\epsilon$ times a modest number elsewhere.
+///
+/// Rows of weight 0 are predicted like all others, without the rest of their fold.
+#[derive(Debug, Clone)]
+pub struct Validator<A: Scalar> {
+    rows: RowSpectrum<A>,
+    /// As given, shape (rows, outputs).
+    targets: Array2<A>,
+    /// Weighted, centred and scaled, as the factorisation saw them.
+    inner_targets: Array2<A>,
+    /// The rows of weight 0, and their coordinates in the singular vectors, one row each.
+    absent: Vec<usize>,
+    absent_coordinates: Array2<A>,
+}
+
+impl<A: Scalar> Validator<A> {
+    /// Factorises the problem: one singular value decomposition.
+    ///
+    /// # Errors
+    /// [`Error::NoConvergence`] from the factorisation.
+    pub fn new(problem: &LeastSquares<'_, A>) -> Result<Self> {
+        let rows = RowSpectrum::new(problem)?;
+        let spectrum = &rows.spectrum;
+        let frame = &spectrum.frame;
+        let inner_targets = A::product(rows.u.view(), spectrum.c.view()) + &rows.residual;
+        let absent: Vec<usize> = (0..frame.rows)
+            .filter(|&row| frame.root_weights[row] == A::zero())
+            .collect();
+        // Scaled before centring, as the difference of two huge values may overflow.
+        let hidden = problem.hidden().select(Axis(0), &absent) / frame.hidden_scale;
+        let centred = hidden - frame.hidden_mean.mapv(|m| m / frame.hidden_scale);
+        let absent_coordinates = A::product(centred.view(), spectrum.vt.t()) / &spectrum.s;
+        Ok(Self {
+            targets: problem.targets().to_owned(),
+            inner_targets,
+            absent,
+            absent_coordinates,
+            rows,
+        })
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.targets.nrows()
+    }
+
+    /// Number of outputs.
+    #[must_use]
+    pub fn outputs(&self) -> usize {
+        self.targets.ncols()
+    }
+
+    /// The relative strengths that `ridge` takes for this problem, one per output: given ones, or
+    /// chosen from the same factorisation.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] when its settings are out of range.
+    pub fn strengths(&self, ridge: Ridge) -> Result<Vec<f64>> {
+        ridge.check()?;
+        Ok(ridge.strengths(&self.rows))
+    }
+
+    /// Coordinates of new hidden rows: centred, scaled, along the right singular vectors (shape
+    /// (rows, $k$)), and the squared length that lies outside them.
+    fn coordinates(&self, hidden: &ArrayRef2<A>) -> (Array2<A>, Array1<A>) {
+        let Spectrum { frame, vt, .. } = &self.rows.spectrum;
+        // Scaled before centring, as the difference of two huge values may overflow.
+        let scaled = hidden / frame.hidden_scale;
+        let centred = scaled - frame.hidden_mean.mapv(|m| m / frame.hidden_scale);
+        let inside = A::product(centred.view(), vt.t());
+        let length = |row: ArrayView1<'_, A>| row.dot(&row);
+        let outside = Zip::from(centred.rows())
+            .and(inside.rows())
+            .map_collect(|all, inside| (length(all) - length(inside)).max(A::zero()));
+        (inside, outside)
+    }
+
+    /// What an intercept adds to each of the forms below: $1 / n$, or 0 without one.
+    fn constant_share(&self) -> A {
+        let frame = &self.rows.spectrum.frame;
+        if frame.intercept {
+            A::one() / frame.total_weight
+        } else {
+            A::zero()
+        }
+    }
+
+    /// $1/n + \tilde h^T (\tilde H^T \tilde H + \lambda)^{-1} \tilde h$ for each new hidden row and each
+    /// output's relative strength, shape (rows, outputs).
+    pub(crate) fn posterior_spread(&self, hidden: &ArrayRef2<A>, lambda: &[f64]) -> Array2<A> {
+        let (inside, outside) = self.coordinates(hidden);
+        let s = &self.rows.spectrum.s;
+        let largest = s.first().copied().unwrap_or(A::zero());
+        let mut spread = Array2::zeros((hidden.nrows(), lambda.len()));
+        for (mut column, &lambda) in spread.columns_mut().into_iter().zip(lambda) {
+            let absolute = A::from_f64(lambda) * largest * largest;
+            Zip::from(&mut column)
+                .and(inside.rows())
+                .and(&outside)
+                .for_each(|spread, row, &rest| {
+                    let within: A = row
+                        .iter()
+                        .zip(s)
+                        .map(|(&p, &s)| p * p / (s * s + absolute))
+                        .sum();
+                    let beyond = if rest > A::zero() {
+                        rest / absolute
+                    } else {
+                        A::zero()
+                    };
+                    *spread = self.constant_share() + within + beyond;
+                });
+        }
+        spread
+    }
+
+    /// $1/n + \tilde h^T (\tilde H^T \tilde H + \lambda)^{-1} \tilde h_i$ for one new hidden row and every
+    /// training row $i$: leaving out row $i$ lowers the prediction by its leave-one-out residual
+    /// times this.
+    pub(crate) fn pull(&self, hidden: &ArrayRef2<A>, lambda: f64) -> Array1<A> {
+        let (inside, _) = self.coordinates(hidden);
+        let gain = self.rows.spectrum.ridge_gain(&[A::from_f64(lambda)]);
+        let along = &inside.row(0) * &gain.column(0);
+        self.rows.u.dot(&along) + self.constant_share()
+    }
+
+    /// What is predicted for each row by the fit to all others.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] when `lambda` has neither one entry nor one per output,
+    /// [`Error::Parameter`] when one is negative or not finite, [`Error::Undetermined`] naming the
+    /// first row without which the others have no unique answer to it.
+    pub fn leave_one_out(&self, lambda: &[f64]) -> Result<HeldOut<A>> {
+        let spectrum = &self.rows.spectrum;
+        let squared = self.rows.u.mapv(|u| u * u);
+        self.held_out(lambda, |strength, outputs, inner| {
+            let held_back = spectrum.ridge_held_back(strength);
+            let denominators = squared.dot(&held_back) + &self.rows.free;
+            let least = self.singular_level(strength).powi(2);
+            let lone = !spectrum.can_lose_a_row();
+            for (row, &denominator) in denominators.iter().enumerate() {
+                let present = spectrum.frame.root_weights[row] > A::zero();
+                if present && (lone || denominator <= least) {
+                    return Err(Error::Undetermined { fold: row });
+                }
+            }
+            let c = spectrum.c.select(Axis(1), outputs);
+            let residual = self.rows.residual.select(Axis(1), outputs);
+            inner.assign(&self.rows.leave_one_out(
+                &denominators,
+                &held_back,
+                c.view(),
+                residual.view(),
+            ));
+            let all: Vec<usize> = (0..self.absent.len()).collect();
+            let nothing = Array2::zeros((0, outputs.len()));
+            let rest = self.absent_residuals(&all, strength, outputs, &[], &nothing);
+            Ok(vec![(all, rest)])
+        })
+    }
+
+    /// What is predicted for the rows of each fold by the fit to all other folds. `folds` has one
+    /// label per row, any numbers; rows of one label are left out together.
+    ///
+    /// # Errors
+    /// As [`leave_one_out`](Self::leave_one_out); [`Error::Shape`] also when there is not one
+    /// label per row. [`Error::Undetermined`] names the label.
+    pub fn k_fold(&self, folds: &[usize], lambda: &[f64]) -> Result<HeldOut<A>> {
+        let folds = Fold::divide(self, folds)?;
+        self.k_fold_divided(&folds, lambda)
+    }
+
+    fn k_fold_divided(&self, folds: &[Fold<A>], lambda: &[f64]) -> Result<HeldOut<A>> {
+        self.held_out(lambda, |strength, outputs, inner| {
+            let mut absent = Vec::new();
+            for fold in folds {
+                let residuals = fold.residuals(self, strength, outputs)?;
+                for (&row, residual) in fold.rows.iter().zip(residuals.rows()) {
+                    inner.row_mut(row).assign(&residual);
+                }
+                let rest =
+                    self.absent_residuals(&fold.absent, strength, outputs, &fold.rows, &residuals);
+                absent.push((fold.absent.clone(), rest));
+            }
+            Ok(absent)
+        })
+    }
+
+    /// The held-out error of each output along a path of relative strengths, all folds divided
+    /// once.
+    ///
+    /// # Errors
+    /// Those of [`k_fold`](Self::k_fold).
+    pub fn k_fold_path(&self, folds: &[usize], lambdas: &[f64]) -> Result<Path> {
+        let folds = Fold::divide(self, folds)?;
+        self.path(lambdas, |lambda| self.k_fold_divided(&folds, &[lambda]))
+    }
+
+    /// The leave-one-out error of each output along a path of relative strengths.
+    ///
+    /// # Errors
+    /// Those of [`leave_one_out`](Self::leave_one_out).
+    pub fn leave_one_out_path(&self, lambdas: &[f64]) -> Result<Path> {
+        self.path(lambdas, |lambda| self.leave_one_out(&[lambda]))
+    }
+
+    fn path(&self, lambdas: &[f64], at: impl Fn(f64) -> Result<HeldOut<A>>) -> Result<Path> {
+        if lambdas.is_empty() {
+            return Err(Error::Empty {
+                what: "path of strengths",
+                rows: 0,
+                columns: self.outputs(),
+            });
+        }
+        let mut rmse = Array2::zeros((lambdas.len(), self.outputs()));
+        for (mut row, &lambda) in rmse.rows_mut().into_iter().zip(lambdas) {
+            row.assign(&Array1::from(at(lambda)?.rmse()));
+        }
+        // Relative to what the fit has to explain, so that outputs of any unit can be averaged.
+        let spectrum = &self.rows.spectrum;
+        let scale = Zip::from(&spectrum.total_squares())
+            .and(spectrum.target_scale())
+            .map_collect(
+                |&squares, &scale| match squares.as_f64().sqrt() * scale.as_f64() {
+                    0.0 => 1.0,
+                    size => size,
+                },
+            );
+        Ok(Path {
+            lambdas: lambdas.to_vec(),
+            rmse,
+            scale,
+        })
+    }
+
+    /// Calls `fit` once for each distinct strength, with the outputs that have it, to fill in their
+    /// inner residuals; it returns those of absent rows, in outer units, with their places in
+    /// [`absent`](Self::absent).
+    fn held_out(
+        &self,
+        lambda: &[f64],
+        mut fit: impl FnMut(A, &[usize], &mut Array2<A>) -> Result<Vec<(Vec<usize>, Array2<A>)>>,
+    ) -> Result<HeldOut<A>> {
+        let frame = &self.rows.spectrum.frame;
+        let mut residuals = Array2::zeros(self.targets.dim());
+        for (strength, outputs) in self.by_strength(lambda)? {
+            let mut inner = Array2::zeros((self.rows(), outputs.len()));
+            let absent = fit(strength, &outputs, &mut inner)?;
+            for (column, &output) in outputs.iter().enumerate() {
+                Zip::from(residuals.column_mut(output))
+                    .and(inner.column(column))
+                    .and(&frame.root_weights)
+                    .for_each(|residual, &inner, &root| {
+                        if root > A::zero() {
+                            *residual = inner / root * frame.target_scale[output];
+                        }
+                    });
+                for (places, rest) in &absent {
+                    for (&place, &residual) in places.iter().zip(rest.column(column)) {
+                        residuals[[self.absent[place], output]] = residual;
+                    }
+                }
+            }
+        }
+        let predictions = &self.targets - &residuals;
+        if !predictions.iter().all(|p| p.is_finite()) {
+            return Err(Error::Overflow {
+                what: "a held-out prediction",
+            });
+        }
+        Ok(HeldOut {
+            predictions,
+            residuals,
+            weights: frame.root_weights.mapv(|root| root * root),
+        })
+    }
+
+    /// The distinct strengths with the outputs that have them.
+    fn by_strength(&self, lambda: &[f64]) -> Result<Vec<(A, Vec<usize>)>> {
+        if lambda.len() != 1 {
+            check_length("relative strengths", lambda.len(), self.outputs())?;
+        }
+        let mut groups: Vec<(f64, Vec<usize>)> = Vec::new();
+        for output in 0..self.outputs() {
+            let value = lambda[output.min(lambda.len() - 1)];
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(Error::Parameter {
+                    name: "lambda",
+                    value,
+                    expected: "finite and not negative",
+                });
+            }
+            match groups.iter_mut().find(|(known, _)| *known == value) {
+                Some((_, outputs)) => outputs.push(output),
+                None => groups.push((value, vec![output])),
+            }
+        }
+        Ok(groups
+            .into_iter()
+            .map(|(lambda, outputs)| (A::from_f64(lambda), outputs))
+            .collect())
+    }
+
+    /// How far the rows left must reach into the space of a fold for the fit to be determined.
+    ///
+    /// The pseudo-inverse of the rows left would cut off a direction below rounding error times
+    /// the largest singular value; here directions have been divided by their singular values, so
+    /// the same direction is cut off at that times the condition.
+    fn singular_level(&self, strength: A) -> A {
+        if strength > A::zero() {
+            return A::zero();
+        }
+        let s = &self.rows.spectrum.s;
+        let condition = match (s.first(), s.last()) {
+            (Some(&largest), Some(&smallest)) => largest / smallest,
+            _ => A::one(),
+        };
+        rounding::<A>(self.rows(), self.rows.spectrum.vt.ncols()) * condition
+    }
+
+    /// The residuals, in outer units, of the rows of weight 0 at `places` when `rows`, which have
+    /// the inner held-out residuals `inner`, are left out. Shape (places, `outputs`).
+    fn absent_residuals(
+        &self,
+        places: &[usize],
+        strength: A,
+        outputs: &[usize],
+        rows: &[usize],
+        inner: &Array2<A>,
+    ) -> Array2<A> {
+        let mut residuals = Array2::zeros((places.len(), outputs.len()));
+        if places.is_empty() {
+            return residuals;
+        }
+        let spectrum = &self.rows.spectrum;
+        let frame = &spectrum.frame;
+        // Leaving rows out is fitting the targets less their held-out residuals.
+        let mut c = spectrum.c.select(Axis(1), outputs);
+        c -= &A::product(self.rows.u.select(Axis(0), rows).t(), inner.view());
+        c *= &spectrum.ridge_kept(strength).insert_axis(Axis(1));
+        let constant =
+            self.rows.constant.select(Axis(0), rows).dot(inner) / -frame.total_weight.sqrt();
+        let coordinates = self.absent_coordinates.select(Axis(0), places);
+        let fitted = A::product(coordinates.view(), c.view()) + &constant;
+        for (column, &output) in outputs.iter().enumerate() {
+            for (row, &place) in places.iter().enumerate() {
+                let above_mean = fitted[[row, column]] * frame.target_scale[output];
+                residuals[[row, column]] = self.targets[[self.absent[place], output]]
+                    - frame.target_mean[output]
+                    - above_mean;
+            }
+        }
+        residuals
+    }
+}
+
+/// Predictions for rows by fits that have not seen them; made by [`Validator`] and by
+/// [`CheckedParams::cross_validate`](crate::CheckedParams::cross_validate).
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldOut<A: Scalar> {
+    predictions: Array2<A>,
+    residuals: Array2<A>,
+    /// Relative to the largest.
+    weights: Array1<A>,
+}
+
+impl<A: Scalar> HeldOut<A> {
+    /// The prediction for each row and output, shape (rows, outputs).
+    #[must_use]
+    pub fn predictions(&self) -> ArrayView2<'_, A> {
+        self.predictions.view()
+    }
+
+    /// Target less prediction, shape (rows, outputs); not subtracted from the predictions, so that
+    /// small ones have all their digits.
+    #[must_use]
+    pub fn residuals(&self) -> ArrayView2<'_, A> {
+        self.residuals.view()
+    }
+
+    /// Root mean squared residual of each output over all rows, with the weights of the fit.
+    #[must_use]
+    pub fn rmse(&self) -> Vec<f64> {
+        self.residuals
+            .columns()
+            .into_iter()
+            .map(|column| crate::metrics::root_mean_square(column, self.weights.view()))
+            .collect()
+    }
+}
+
+/// Held-out errors along a path of strengths; made by [`Validator`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Path {
+    lambdas: Vec<f64>,
+    rmse: Array2<f64>,
+    /// For each output the size of its (centred) targets.
+    scale: Array1<f64>,
+}
+
+impl Path {
+    /// The relative strengths, as they were asked for.
+    #[must_use]
+    pub fn lambdas(&self) -> &[f64] {
+        &self.lambdas
+    }
+
+    /// The held-out RMSE, shape (strengths, outputs).
+    #[must_use]
+    pub fn rmse(&self) -> ArrayView2<'_, f64> {
+        self.rmse.view()
+    }
+
+    /// For each output the strength with the smallest error; of equals the last, so the strongest
+    /// of a rising path.
+    #[must_use]
+    pub fn best(&self) -> Vec<f64> {
+        self.rmse
+            .columns()
+            .into_iter()
+            .map(|scores| self.lambdas[Ridge::best(scores)])
+            .collect()
+    }
+
+    /// The strength with the smallest sum over outputs of the squared error relative to the
+    /// output's own variance.
+    #[must_use]
+    pub fn best_shared(&self) -> f64 {
+        let relative = &self.rmse / &self.scale;
+        self.lambdas[Ridge::best(relative.mapv(|r| r * r).sum_axis(Axis(1)).view())]
+    }
+}
+
+/// Assigns each row to one of `folds` folds at random, sizes differing by at most 1; one seed
+/// gives one assignment on every platform.
+///
+/// # Errors
+/// [`Error::Parameter`] unless $2 \le$ `folds` $\le$ `rows`.
+pub fn assign_folds(rows: usize, folds: usize, seed: u64) -> Result<Vec<usize>> {
+    if folds < 2 || folds > rows {
+        return Err(Error::Parameter {
+            name: "folds",
+            value: folds as f64,
+            expected: "at least 2 and at most the number of rows",
+        });
+    }
+    let mut labels: Vec<usize> = (0..rows).map(|row| row % folds).collect();
+    labels.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+    Ok(labels)
+}

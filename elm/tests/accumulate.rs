@@ -1,0 +1,453 @@
+//! Rows that arrive in pieces give the answer of a batch fit.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests are not seen as tests.
+
+mod common;
+
+use common::{amplification, frobenius, normal, weights};
+use elm::solve::{Inverse, PseudoInverse, Ridge, Solver};
+use elm::{Accumulator, Biases, CheckedParams, Elm, ElmParams, Error, Scalar, Scaler};
+use ndarray::{Array1, Array2, Axis, array, s};
+
+fn data<A: Scalar>(rows: usize, seed: u64) -> (Array2<A>, Array2<A>) {
+    let x = normal::<A>(rows, 3, seed);
+    let noise = normal::<A>(rows, 2, seed + 1).mapv(|v| v * A::from_f64(0.1));
+    let mut t = Array2::zeros((rows, 2));
+    t.column_mut(0)
+        .assign(&x.map_axis(Axis(1), |row| (row[0] + row[1] * row[2]).sin()));
+    t.column_mut(1)
+        .assign(&x.map_axis(Axis(1), |row| row[2].exp() + A::from_f64(1e3)));
+    (x, t + noise)
+}
+
+fn accumulated<A: Scalar>(
+    params: &CheckedParams<A>,
+    x: &Array2<A>,
+    t: &Array2<A>,
+    chunk: usize,
+) -> Accumulator<A> {
+    let mut accumulator = Accumulator::from_sample(params, x, t.ncols()).unwrap();
+    for (x, t) in x
+        .axis_chunks_iter(Axis(0), chunk)
+        .zip(t.axis_chunks_iter(Axis(0), chunk))
+    {
+        accumulator.push(&x, &t).unwrap();
+    }
+    accumulator
+}
+
+/// Both fits have residuals of their best to rounding error, so fitted values differ by epsilon
+/// times the condition (of the residual, by perturbation theory: Higham 2002, ch. 20).
+fn assert_same_fit<A: Scalar>(one: &Elm<A>, other: &Elm<A>, x: &Array2<A>, what: &str) {
+    let (a, b) = (one.predict(x).unwrap(), other.predict(x).unwrap());
+    let size = x.nrows() as f64 + x.ncols() as f64;
+    let amplification = amplification(one.diagnosis()).min(amplification(other.diagnosis()));
+    let bound = 4.0 * size.sqrt() * A::epsilon().as_f64() * amplification * frobenius(&a);
+    let error = frobenius(&(&a - &b));
+    assert!(error <= bound, "{what}: {error:e} > {bound:e}");
+}
+
+fn solvers() -> [Solver; 3] {
+    [
+        PseudoInverse::default().into(),
+        Ridge::relative(1e-6).into(),
+        Ridge::gcv().into(),
+    ]
+}
+
+#[test]
+fn chunks_of_any_size_give_the_batch_answer() {
+    let (x, t) = data::<f64>(400, 1);
+    for solver in solvers() {
+        for (intercept, links) in [(true, false), (false, true)] {
+            let params = ElmParams::new(15)
+                .solver(solver)
+                .intercept(intercept)
+                .direct_links(links)
+                .check()
+                .unwrap();
+            let batch = params.fit(&x, &t).unwrap();
+            for chunk in [1, 7, 100, 400] {
+                let accumulator = accumulated(&params, &x, &t, chunk);
+                assert_eq!(accumulator.rows(), 400);
+                let model = accumulator.fit().unwrap();
+                assert_same_fit(&model, &batch, &x, &format!("{solver}, chunks of {chunk}"));
+                let (a, b) = (model.diagnosis(), batch.diagnosis());
+                assert_eq!(a.lambda, b.lambda);
+                for (a, b) in a.residual_norm.iter().zip(&b.residual_norm) {
+                    approx::assert_relative_eq!(*a, *b, max_relative = 1e-8);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_order_of_rows_and_the_way_of_merging_do_not_matter() {
+    let (x, t) = data::<f64>(600, 3);
+    let params = ElmParams::new(12).solver(Ridge::gcv()).check().unwrap();
+    let batch = params.fit(&x, &t).unwrap();
+    let start = Accumulator::with_scaler(&params, Scaler::measured(&x).unwrap(), 2).unwrap();
+    let part = |range: std::ops::Range<usize>| {
+        let mut part = start.clone();
+        part.push(&x.slice(s![range.clone(), ..]), &t.slice(s![range, ..]))
+            .unwrap();
+        part
+    };
+    let mut parts = [part(0..5), part(5..250), part(250..250), part(250..600)];
+    // A chain, backwards; then a tree.
+    let mut chain = start.clone();
+    parts.iter().rev().for_each(|p| chain.merge(p).unwrap());
+    let (left, right) = parts.split_at_mut(2);
+    left[0].merge(&right[1]).unwrap();
+    left[1].merge(&right[0]).unwrap();
+    left[1].merge(&left[0].clone()).unwrap();
+    for merged in [&chain, &left[1]] {
+        assert_eq!(merged.rows(), 600);
+        assert_same_fit(&merged.fit().unwrap(), &batch, &x, "merged");
+    }
+    // More rows after a fit.
+    let mut more = part(0..250);
+    more.fit().unwrap();
+    more.push(&x.slice(s![250.., ..]), &t.slice(s![250.., ..]))
+        .unwrap();
+    assert_same_fit(&more.fit().unwrap(), &batch, &x, "continued");
+}
+
+#[test]
+fn biases_on_the_data_come_from_the_sample() {
+    let (x, t) = data::<f64>(200, 4);
+    let params = ElmParams::new(10)
+        .biases(Biases::OnData)
+        .solver(Ridge::gcv())
+        .check()
+        .unwrap();
+    let batch = params.fit(&x, &t).unwrap();
+    let mut one = accumulated(&params, &x, &t, 50);
+    assert_same_fit(&one.fit().unwrap(), &batch, &x, "one sample");
+    one.merge(&Accumulator::from_sample(&params, &x, 2).unwrap())
+        .unwrap();
+    let scaler = Scaler::measured(&x).unwrap();
+    assert!(matches!(
+        Accumulator::with_scaler(&params, scaler, 2),
+        Err(Error::Conflict { .. })
+    ));
+}
+
+#[test]
+fn weighted_rows_give_the_weighted_batch_answer() {
+    let (x, t) = data::<f64>(200, 5);
+    let mut w = weights::<f64>(200, 6);
+    w.slice_mut(s![..;3]).fill(0.0);
+    for factor in [1.0, 1e-200, 1e200] {
+        let params = ElmParams::new(10)
+            .solver(Ridge::relative(1e-6))
+            .check()
+            .unwrap();
+        let w = &w * factor;
+        let batch = params.fit_weighted(&x, &t, Some(w.view())).unwrap();
+        let mut accumulator = Accumulator::from_sample(&params, &x, 2).unwrap();
+        for start in (0..200).step_by(30) {
+            let range = start..200.min(start + 30);
+            accumulator
+                .push_weighted(
+                    &x.slice(s![range.clone(), ..]),
+                    &t.slice(s![range.clone(), ..]),
+                    &w.slice(s![range]),
+                )
+                .unwrap();
+        }
+        let model = accumulator.fit().unwrap();
+        assert_same_fit(&model, &batch, &x, "weighted");
+        approx::assert_relative_eq!(
+            model.diagnosis().largest_singular_value,
+            batch.diagnosis().largest_singular_value,
+            max_relative = 1e-9
+        );
+    }
+}
+
+#[test]
+fn fewer_rows_than_neurons_give_the_batch_answer() {
+    let (x, t) = data::<f64>(12, 7);
+    for solver in [
+        Solver::from(PseudoInverse::default()),
+        Ridge::relative(1e-4).into(),
+    ] {
+        let params = ElmParams::new(30).solver(solver).check().unwrap();
+        let batch = params.fit(&x, &t).unwrap();
+        for rows in [1, 5] {
+            let model = accumulated(&params, &x, &t, rows).fit().unwrap();
+            assert_same_fit(&model, &batch, &x, solver.name());
+        }
+    }
+}
+
+#[test]
+fn inputs_without_information_are_answered_by_the_mean() {
+    let (x, t) = (Array2::from_elem((50, 2), 0.1), normal::<f64>(50, 1, 8));
+    for solver in solvers() {
+        let params = ElmParams::new(9).solver(solver).check().unwrap();
+        let y = accumulated(&params, &x, &t, 7)
+            .fit()
+            .unwrap()
+            .predict(&x)
+            .unwrap();
+        assert!((y - t.sum() / 50.0).iter().all(|d: &f64| d.abs() < 1e-13));
+    }
+}
+
+#[test]
+fn targets_of_any_size_give_the_answer_of_the_batch() {
+    let (x, t) = data::<f64>(100, 9);
+    let params = ElmParams::new(10)
+        .solver(Ridge::relative(1e-6))
+        .check()
+        .unwrap();
+    for (first, second) in [(1.0, 1.0), (1e-200, 1.0), (1.0, 1e200), (1e300, 1e300)] {
+        let mut t = t.clone();
+        t.slice_mut(s![..50, ..]).mapv_inplace(|v| v / 1e3 * first);
+        t.slice_mut(s![50.., ..]).mapv_inplace(|v| v / 1e3 * second);
+        let model = accumulated(&params, &x, &t, 25).fit().unwrap();
+        assert_same_fit(&model, &params.fit(&x, &t).unwrap(), &x, "scaled");
+    }
+}
+
+#[test]
+fn leave_one_out_is_replaced_by_generalised_cross_validation() {
+    let (x, t) = data::<f64>(150, 10);
+    let params = |ridge: Ridge| ElmParams::new(10).solver(ridge).check().unwrap();
+    let default = accumulated(&params(Ridge::default()), &x, &t, 40)
+        .fit()
+        .unwrap();
+    let gcv = accumulated(&params(Ridge::gcv()), &x, &t, 40)
+        .fit()
+        .unwrap();
+    assert_eq!(default, gcv);
+    assert_eq!(default.diagnosis().leave_one_out, None);
+}
+
+#[test]
+fn what_cannot_be_taken_in_is_an_error_and_leaves_no_trace() {
+    let (x, t) = data::<f64>(300, 11);
+    let params = ElmParams::new(10).check().unwrap();
+    let mut accumulator = accumulated(&params, &x, &t, 50);
+    let before = accumulator.clone();
+    let (mut bad_x, mut bad_t) = (x.clone(), t.clone());
+    bad_x[[299, 2]] = f64::NAN;
+    bad_t[[0, 1]] = f64::INFINITY;
+    let place = |what, row, column| Error::NotFinite { what, row, column };
+    let shape = |what, expected, found| Error::Shape {
+        what,
+        expected,
+        found,
+    };
+    for (result, expected) in [
+        (accumulator.push(&bad_x, &t), place("inputs", 299, 2)),
+        (accumulator.push(&x, &bad_t), place("targets", 0, 1)),
+        (accumulator.push(&x, &x), shape("outputs", 2, 3)),
+        (accumulator.push(&t, &t), shape("inputs", 3, 2)),
+        (
+            accumulator.push(&x, &t.slice(s![..9, ..])),
+            shape("rows of targets", 300, 9),
+        ),
+        (
+            accumulator.push_weighted(&x, &t, &Array1::ones(2)),
+            shape("row weights", 300, 2),
+        ),
+    ] {
+        assert_eq!(result, Err(expected));
+    }
+    // In the range until it is weighted, in a few rows and in many.
+    let huge = Array2::from_elem((300, 2), 1e308);
+    for rows in [2, 300] {
+        let w = Array1::from_elem(rows, 1e300);
+        let (x, t) = (x.slice(s![..rows, ..]), huge.slice(s![..rows, ..]));
+        assert!(matches!(
+            accumulator.push_weighted(&x, &t, &w),
+            Err(Error::Overflow { .. })
+        ));
+    }
+    assert_eq!(accumulator, before);
+    accumulator
+        .push(&x.slice(s![..0, ..]), &t.slice(s![..0, ..]))
+        .unwrap();
+    assert_eq!(accumulator, before);
+}
+
+#[test]
+fn accumulators_of_different_kinds_do_not_merge() {
+    let (x, _) = data::<f64>(20, 12);
+    let make = |params: ElmParams<f64>, outputs| {
+        Accumulator::from_sample(&params.check().unwrap(), &x, outputs).unwrap()
+    };
+    let plain = || ElmParams::new(5).solver(Ridge::gcv());
+    let elsewhere = &x + 1.0;
+    let scaler = Scaler::measured(&elsewhere).unwrap();
+    let other = Accumulator::with_scaler(&plain().check().unwrap(), scaler, 2).unwrap();
+    for (other, what) in [
+        (make(plain().seed(1), 2), "random layers"),
+        (other, "scalers of inputs"),
+        (make(plain(), 1), "numbers of outputs"),
+        (make(plain().direct_links(true), 2), "direct links"),
+        (make(plain().intercept(false), 2), "intercepts"),
+        (make(plain().solver(Ridge::relative(0.1)), 2), "solvers"),
+    ] {
+        assert_eq!(
+            make(plain(), 2).merge(&other),
+            Err(Error::Mismatch { what })
+        );
+    }
+}
+
+#[test]
+fn what_cannot_be_accumulated_is_an_error() {
+    let (x, t) = data::<f64>(20, 13);
+    let check = |params: ElmParams<f64>| params.check().unwrap();
+    let scaler = Scaler::measured(&x).unwrap();
+    let inverse = check(ElmParams::new(20).solver(Inverse));
+    assert!(matches!(
+        Accumulator::from_sample(&inverse, &x, 1),
+        Err(Error::Conflict { .. })
+    ));
+    let unscaled = check(ElmParams::new(5).standardise(false));
+    assert!(matches!(
+        Accumulator::with_scaler(&unscaled, scaler, 1),
+        Err(Error::Conflict { .. })
+    ));
+    let params = check(ElmParams::new(5));
+    assert!(matches!(
+        Accumulator::from_sample(&params, &x, 0),
+        Err(Error::Parameter {
+            name: "outputs",
+            ..
+        })
+    ));
+    assert!(matches!(
+        Accumulator::from_sample(&check(ElmParams::new(usize::MAX / 8)), &x, 1),
+        Err(Error::TooLarge { .. })
+    ));
+    let mut none = Accumulator::from_sample(&params, &x, 2).unwrap();
+    assert!(matches!(none.fit(), Err(Error::Empty { .. })));
+    none.push_weighted(&x, &t, &Array1::zeros(20)).unwrap();
+    assert!(matches!(none.fit(), Err(Error::Empty { .. })));
+    assert!(matches!(
+        params.fit_chunks(std::iter::empty::<Result<_, Error>>()),
+        Err(Error::Empty { what: "chunks", .. })
+    ));
+    for (mean, deviation) in [
+        (array![0.0, f64::NAN], array![1.0, 1.0]),
+        (array![0.0], array![1.0, 1.0]),
+        (array![0.0], array![-1.0]),
+        (array![], array![]),
+    ] {
+        assert!(Scaler::new(&mean, &deviation).is_err());
+    }
+}
+
+#[test]
+fn chunks_from_an_iterator_are_fitted_and_its_error_is_passed_on() {
+    let (x, t) = data::<f64>(90, 14);
+    let params = ElmParams::new(8).solver(Ridge::gcv()).check().unwrap();
+    let chunk = |i: usize| {
+        (
+            x.slice(s![i * 30..(i + 1) * 30, ..]).to_owned(),
+            t.slice(s![i * 30..(i + 1) * 30, ..]).to_owned(),
+        )
+    };
+    let model = params
+        .fit_chunks((0..3).map(|i| Ok::<_, Error>(chunk(i))))
+        .unwrap();
+    let first = x.slice(s![..30, ..]).to_owned();
+    let mut expected = Accumulator::from_sample(&params, &first, 2).unwrap();
+    expected.push(&x, &t).unwrap();
+    assert_same_fit(&model, &expected.fit().unwrap(), &x, "chunks");
+
+    let broken = (0..3).map(|i| {
+        if i == 1 {
+            Err(Error::NoConvergence { what: "reading" })
+        } else {
+            Ok(chunk(i))
+        }
+    });
+    assert_eq!(
+        params.fit_chunks(broken),
+        Err(Error::NoConvergence { what: "reading" })
+    );
+}
+
+#[test]
+fn an_accumulator_survives_serialisation() {
+    let (x, t) = data::<f64>(200, 15);
+    let params = ElmParams::new(10).solver(Ridge::gcv()).check().unwrap();
+    let accumulator = accumulated(&params, &x, &t, 60);
+    let text = serde_json::to_string(&accumulator).unwrap();
+    let read: Accumulator<f64> = serde_json::from_str(&text).unwrap();
+    assert_same_fit(
+        &read.fit().unwrap(),
+        &accumulator.fit().unwrap(),
+        &x,
+        "read back",
+    );
+}
+
+#[test]
+fn single_precision_accumulates_too() {
+    let (x, t) = data::<f32>(300, 16);
+    for solver in [Ridge::relative(1e-3), Ridge::gcv()] {
+        let params = ElmParams::new(10).solver(solver).check().unwrap();
+        let model = accumulated(&params, &x, &t, 17).fit().unwrap();
+        assert_same_fit(&model, &params.fit(&x, &t).unwrap(), &x, "f32");
+    }
+}
+
+#[test]
+fn a_damaged_accumulator_is_not_read() {
+    let (x, t) = data::<f64>(200, 15);
+    let params = ElmParams::new(4).solver(Ridge::gcv()).check().unwrap();
+    let whole = serde_json::to_value(accumulated(&params, &x, &t, 60)).unwrap();
+    let read = |value: &serde_json::Value| {
+        serde_json::from_value::<Accumulator<f64>>(value.clone()).is_ok()
+    };
+    assert!(read(&whole));
+    for (field, value) in [
+        ("outputs", serde_json::json!(1)),
+        ("outputs", serde_json::json!(u64::MAX)),
+        ("inputs", serde_json::json!(2)),
+        ("direct_links", serde_json::json!(true)),
+        ("intercept", serde_json::json!(false)),
+        ("pending", serde_json::json!([1.0])),
+        ("pending", serde_json::json!(vec![0.5; 7 * 28])),
+        (
+            "scaler",
+            serde_json::json!({"mean": {"v": 1, "dim": [1], "data": [0.0]},
+                                      "factor": {"v": 1, "dim": [1], "data": [0.0]}}),
+        ),
+        (
+            "scales",
+            serde_json::json!({"v": 1, "dim": [1], "data": [1.0]}),
+        ),
+        (
+            "scales",
+            serde_json::json!({"v": 1, "dim": [7], "data": vec![0.0; 7]}),
+        ),
+        (
+            "triangle",
+            serde_json::json!({"v": 1, "dim": [7, 6], "data": vec![0.0; 42]}),
+        ),
+        (
+            "solver",
+            serde_json::json!({"ridge": {"lambda": {"relative": -1.0}, "shared": false}}),
+        ),
+    ] {
+        let mut damaged = whole.clone();
+        damaged[field] = value;
+        assert!(!read(&damaged), "{field}: {}", damaged[field]);
+    }
+    // A triangle of zeros is well formed, and has no mean.
+    let mut empty = whole;
+    empty["triangle"] = serde_json::json!({"v": 1, "dim": [7, 7], "data": vec![0.0; 49]});
+    empty["pending"] = serde_json::json!([]);
+    let empty: Accumulator<f64> = serde_json::from_value(empty).unwrap();
+    assert!(matches!(empty.fit(), Err(Error::Overflow { .. })));
+}

@@ -1,0 +1,210 @@
+//! Files: round trips, and every way in which one can be wrong.
+
+#![allow(clippy::unwrap_used)]
+
+use elm::persist::{self, Error};
+use elm::{Activation, Elm, ElmParams};
+use ndarray::{Array2, array};
+use proptest::prelude::*;
+
+fn data() -> (Array2<f64>, Array2<f64>) {
+    let x = Array2::from_shape_fn((30, 3), |(i, j)| ((i * (j + 2)) as f64 * 0.37).sin());
+    let t = Array2::from_shape_fn((30, 2), |(i, j)| x[[i, j]] * x[[i, 2]] + 0.1);
+    (x, t)
+}
+
+fn models() -> Vec<Elm<f64>> {
+    let (x, t) = data();
+    Activation::BUILT_IN
+        .into_iter()
+        .map(|activation| ElmParams::new(12).activation(activation))
+        .chain([
+            ElmParams::new(5).direct_links(true),
+            ElmParams::new(5).standardise(false),
+        ])
+        .map(|params| params.fit(&x, &t).unwrap())
+        .collect()
+}
+
+#[test]
+fn both_forms_give_back_the_same_network_bit_for_bit() {
+    let (x, _) = data();
+    for model in models() {
+        let bytes = persist::to_bytes(&model).unwrap();
+        let text = persist::to_json(&model).unwrap();
+        for form in [bytes.as_slice(), text.as_bytes()] {
+            let again: Elm<f64> = persist::from_bytes(form).unwrap();
+            assert_eq!(again, model);
+            assert_eq!(again.predict(&x).unwrap(), model.predict(&x).unwrap());
+        }
+        assert!(bytes.len() < text.len());
+    }
+}
+
+#[test]
+fn single_precision_is_kept_apart_from_double() {
+    let (x, t) = data();
+    let (x, t) = (x.mapv(|v| v as f32), t.mapv(|v| v as f32));
+    let single = ElmParams::<f32>::new(9).fit(&x, &t).unwrap();
+    for form in [
+        persist::to_bytes(&single).unwrap(),
+        persist::to_json(&single).unwrap().into_bytes(),
+    ] {
+        assert_eq!(persist::from_bytes::<Elm<f32>>(&form).unwrap(), single);
+        let error = persist::from_bytes::<Elm<f64>>(&form).unwrap_err();
+        assert!(
+            matches!(&error, Error::ScalarType { found, expected: "f64" } if found == "f32"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn files_are_written_whole_in_the_form_their_name_asks_for() {
+    let dir = tempfile::tempdir().unwrap();
+    let model = &models()[0];
+    for name in ["model.json", "model.elm"] {
+        let path = dir.path().join(name);
+        std::fs::write(&path, "what was there before").unwrap();
+        persist::save(model, &path).unwrap();
+        assert_eq!(&persist::load::<Elm<f64>>(&path).unwrap(), model);
+    }
+    let text = std::fs::read_to_string(dir.path().join("model.json")).unwrap();
+    assert!(
+        text.starts_with("{\n  \"format\": \"elm model\",\n  \"version\": 1,"),
+        "{text:.80}"
+    );
+    assert_eq!(
+        std::fs::read_dir(dir.path()).unwrap().count(),
+        2,
+        "nothing is left behind"
+    );
+
+    let nowhere = dir.path().join("no/such/folder/model.elm");
+    let error = persist::save(model, &nowhere).unwrap_err();
+    assert!(
+        matches!(
+            error,
+            Error::Io {
+                action: "write",
+                ..
+            }
+        ),
+        "{error}"
+    );
+    let error = persist::load::<Elm<f64>>(&nowhere).unwrap_err();
+    assert!(matches!(error, Error::Io { action: "read", .. }), "{error}");
+}
+
+#[test]
+fn a_custom_activation_is_refused_by_name() {
+    let (x, t) = data();
+    let cube = Activation::custom("cube", |z: f64| z * z * z);
+    let model = ElmParams::new(4).activation(cube).fit(&x, &t).unwrap();
+    for error in [
+        persist::to_bytes(&model).unwrap_err(),
+        persist::to_json(&model).unwrap_err(),
+    ] {
+        assert!(
+            matches!(&error, Error::CustomActivation { name } if name == "cube"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn each_kind_of_damage_has_its_own_error() {
+    let bytes = persist::to_bytes(&models()[0]).unwrap();
+    let refuse = |bytes: &[u8]| persist::from_bytes::<Elm<f64>>(bytes).unwrap_err();
+    let with = |at: usize, value: u8| {
+        let mut bytes = bytes.clone();
+        bytes[at] = value;
+        bytes
+    };
+    assert!(matches!(refuse(b""), Error::Foreign));
+    assert!(matches!(refuse(b"%PDF-1.7 and so on"), Error::Foreign));
+    assert!(matches!(
+        refuse(&with(8, 2)),
+        Error::Future {
+            found: 2,
+            supported: 1
+        }
+    ));
+    assert!(matches!(refuse(&with(13, b'E')), Error::Kind { .. }));
+    let last = bytes.len() - 1;
+    assert!(matches!(
+        refuse(&with(last, bytes[last] ^ 1)),
+        Error::Checksum { .. }
+    ));
+    assert!(matches!(refuse(&bytes[..last]), Error::Length { .. }));
+    assert!(matches!(
+        refuse(&[bytes.as_slice(), b"x"].concat()),
+        Error::Length { .. }
+    ));
+    assert!(matches!(refuse(b"{\"format\": 3}"), Error::Contents { .. }));
+}
+
+#[test]
+fn a_file_that_contradicts_itself_is_refused() {
+    // Valid JSON by a hostile hand: sizes that do not fit together, values that are not finite,
+    // and a length that no memory could hold.
+    let text = persist::to_json(&models()[0]).unwrap();
+    let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let mutate = |change: &dyn Fn(&mut serde_json::Value)| {
+        let mut value = value.clone();
+        change(&mut value["contents"]);
+        persist::from_bytes::<Elm<f64>>(value.to_string().as_bytes())
+            .unwrap_err()
+            .to_string()
+    };
+    let huge = serde_json::json!([1u64 << 40, 1u64 << 40]);
+    for error in [
+        mutate(&|c| c["intercept"]["data"] = serde_json::json!([0.0])),
+        mutate(&|c| c["intercept"] = serde_json::json!({"v": 1, "dim": [1], "data": [0.0]})),
+        mutate(&|c| c["beta"]["dim"] = huge.clone()),
+        mutate(&|c| c["beta"] = serde_json::json!({"v": 1, "dim": [1, 2], "data": [0.0, 0.0]})),
+        mutate(&|c| c["scaler"]["mean"] = serde_json::json!({"v": 1, "dim": [1], "data": [0.0]})),
+        mutate(&|c| c["beta"]["data"][0] = serde_json::json!(null)),
+        mutate(&|c| c["hidden"]["activation"] = serde_json::json!("cube")),
+        mutate(&|c| c["direct_links"] = serde_json::json!(true)),
+    ] {
+        assert!(
+            error.starts_with("the file's contents are not a elm model"),
+            "{error}"
+        );
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(512))]
+
+    #[test]
+    fn no_bytes_make_reading_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+        let _ = persist::from_bytes::<Elm<f64>>(&bytes);
+    }
+
+    #[test]
+    fn no_damage_to_a_model_makes_reading_or_predicting_panic(
+        json in any::<bool>(), at in any::<prop::sample::Index>(), value in any::<u8>(),
+        fix in any::<bool>(),
+    ) {
+        let (x, t) = (array![[0.0], [1.0], [2.0]], array![0.0, 1.0, 4.0]);
+        let model = ElmParams::new(3).fit(&x, &t).unwrap();
+        let mut bytes = if json {
+            persist::to_json(&model).unwrap().into_bytes()
+        } else {
+            persist::to_bytes(&model).unwrap()
+        };
+        let at = at.index(bytes.len());
+        bytes[at] = value;
+        if fix && !json {
+            // With the checksum made right again the decoder itself is what stands guard.
+            let payload = bytes.len().min(8 + 4 + 10 + 4 + 12);
+            let crc = crc32fast::hash(&bytes[payload..]).to_le_bytes();
+            bytes[payload - 4..payload].copy_from_slice(&crc);
+        }
+        if let Ok(model) = persist::from_bytes::<Elm<f64>>(&bytes) {
+            let _ = model.predict(&x);
+        }
+    }
+}

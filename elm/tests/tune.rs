@@ -1,0 +1,172 @@
+//! Tuning: what it chooses is near the best there is, repeats itself, and keeps its budget.
+
+#![allow(clippy::unwrap_used)]
+
+use elm::tune::Criterion;
+use elm::{Activation, ElmParams, Error, metrics};
+use ndarray::{Array1, Array2, Axis, array};
+use ndarray_rand::RandomExt;
+use ndarray_rand::rand_distr::{StandardNormal, StandardUniform};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// A wave in the first of three inputs, with a little noise; the others say nothing.
+fn wave(rows: usize, seed: u64) -> (Array2<f64>, Array1<f64>) {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let x: Array2<f64> = Array2::random_using((rows, 3), StandardUniform, &mut random);
+    let noise: Array1<f64> = Array1::random_using(rows, StandardNormal, &mut random);
+    let t = x.column(0).mapv(|x| (9.0 * x).sin()) + 0.05 * noise;
+    (x, t)
+}
+
+fn rmse(model: &elm::Elm<f64>, (x, t): &(Array2<f64>, Array1<f64>)) -> f64 {
+    metrics::rmse(&model.predict(x).unwrap().column(0), t).unwrap()
+}
+
+#[test]
+fn the_chosen_scale_is_nearly_as_good_as_the_best_of_a_dense_grid() {
+    let (train, test) = (wave(250, 1), wave(1000, 2));
+    let params = || ElmParams::new(80).activation(Activation::Tanh).seed(3);
+    let tuned = params().tuner().tune(&train.0, &train.1).unwrap();
+    let best = (-8..=8)
+        .map(|step| {
+            let scale = 10.0_f64.powf(f64::from(step) / 5.0);
+            rmse(
+                &params().scale(scale).fit(&train.0, &train.1).unwrap(),
+                &test,
+            )
+        })
+        .fold(f64::INFINITY, f64::min);
+    let chosen = rmse(&tuned.model, &test);
+    assert!(chosen <= 1.1 * best, "{chosen} against {best}");
+}
+
+#[test]
+fn a_scale_per_input_silences_inputs_that_say_nothing() {
+    let (train, test) = (wave(250, 1), wave(1000, 2));
+    let tuner = ElmParams::new(80).activation(Activation::Tanh).tuner();
+    let shared = tuner.tune(&train.0, &train.1).unwrap();
+    let own = tuner
+        .per_input(true)
+        .budget(60)
+        .tune(&train.0, &train.1)
+        .unwrap();
+    let scales = &own.best.input_scales;
+    assert!(
+        scales[0] > 3.0 * scales[1] && scales[0] > 3.0 * scales[2],
+        "{scales:?}"
+    );
+    assert!(rmse(&own.model, &test) < 0.8 * rmse(&shared.model, &test));
+}
+
+#[test]
+fn neurons_are_doubled_only_while_that_pays() {
+    let (x, _) = wave(400, 5);
+    // A straight line needs few; noise is no reason for more.
+    let noise: Array1<f64> =
+        Array1::random_using(400, StandardNormal, &mut ChaCha8Rng::seed_from_u64(6));
+    let line = ElmParams::auto()
+        .tune(&x, &(x.column(0).mapv(|x| 3.0 * x) + 0.1 * noise))
+        .unwrap();
+    assert!(line.best.neurons <= 200, "{}", line.best.neurons);
+    // Many waves need many.
+    let waves = x.column(0).mapv(|x| (150.0 * x).sin());
+    let x = x.select(Axis(1), &[0]);
+    let waves = ElmParams::auto().tune(&x, &waves).unwrap();
+    assert!(
+        waves.best.neurons > line.best.neurons,
+        "{}",
+        waves.best.neurons
+    );
+}
+
+#[test]
+fn a_seed_repeats_the_search_and_the_budget_bounds_it() {
+    let (x, t) = wave(120, 1);
+    for budget in [1, 5, 12] {
+        let tuner = ElmParams::auto().seed(9).budget(budget).search_rows(100);
+        let first = tuner.tune(&x, &t).unwrap();
+        assert_eq!(first, tuner.tune(&x, &t).unwrap());
+        assert!(first.trials.len() <= budget);
+        assert!(first.trials.contains(&first.best));
+    }
+}
+
+#[test]
+fn the_final_fit_is_that_of_the_reported_settings() {
+    let (x, t) = wave(120, 1);
+    let tuned = ElmParams::auto().tune(&x, &t).unwrap();
+    assert_eq!(tuned.params.fit(&x, &t).unwrap(), tuned.model);
+    assert_eq!(ElmParams::auto().fit(&x, &t).unwrap(), tuned.model);
+}
+
+#[test]
+fn k_fold_sees_through_rows_that_are_copies_of_each_other() {
+    let (x, t) = wave(60, 1);
+    let twice = |a: &Array2<f64>| ndarray::concatenate(Axis(0), &[a.view(), a.view()]).unwrap();
+    let (x, t) = (twice(&x), twice(&t.insert_axis(Axis(1))));
+    let k_fold = ElmParams::auto()
+        .criterion(Criterion::KFold(5))
+        .tune(&x, &t)
+        .unwrap();
+    let one_out = ElmParams::auto().tune(&x, &t).unwrap();
+    // With its copy still there a row is easily predicted.
+    assert!(one_out.best.score < k_fold.best.score);
+}
+
+#[test]
+fn extreme_but_finite_data_are_tuned_without_harm() {
+    for (x, t) in [
+        (array![[1.0]], array![2.0]),
+        (array![[1.0], [2.0]], array![1.0, 1.0]),
+        (Array2::zeros((20, 3)), Array1::zeros(20)),
+        (
+            Array2::from_elem((20, 2), 1e300),
+            Array1::linspace(-1e300, 1e300, 20),
+        ),
+        (
+            Array1::linspace(0.0, 1e-310, 20).insert_axis(Axis(1)),
+            Array1::linspace(0.0, 1e-310, 20),
+        ),
+    ] {
+        let model = ElmParams::auto().fit(&x, &t).unwrap();
+        assert!(
+            model
+                .predict(&x)
+                .unwrap()
+                .iter()
+                .all(|y: &f64| y.is_finite())
+        );
+    }
+}
+
+#[test]
+fn bad_settings_are_named() {
+    let (x, t) = wave(30, 1);
+    let refuse = |tuner: elm::Tuner<f64>| tuner.fit(&x, &t).unwrap_err();
+    for (tuner, expected) in [
+        (ElmParams::auto().budget(0), "budget"),
+        (ElmParams::auto().max_neurons(0), "max_neurons"),
+        (ElmParams::auto().search_rows(1), "search_rows"),
+        (ElmParams::auto().criterion(Criterion::KFold(1)), "folds"),
+        (ElmParams::auto().criterion(Criterion::KFold(31)), "folds"),
+        (ElmParams::new(0).tuner(), "neurons"),
+    ] {
+        let error = refuse(tuner);
+        assert!(
+            matches!(error, Error::Parameter { name, .. } if name == expected),
+            "{error}"
+        );
+    }
+    let nan = ElmParams::auto()
+        .fit(&array![[f64::NAN]], &array![1.0])
+        .unwrap_err();
+    assert!(matches!(
+        nan,
+        Error::NotFinite {
+            what: "inputs",
+            row: 0,
+            column: 0
+        }
+    ));
+}
