@@ -84,14 +84,15 @@ pub(super) fn sine_fast<S: Simd, A: Coefficients>(z: Lanes<S, A>) -> Lanes<S, A>
 #[inline(always)]
 fn reduced_sine<S: Simd, A: Coefficients>(z: Lanes<S, A>, polynomial: &[A]) -> Lanes<S, A> {
     let n = z.round_product(A::FRAC_1_PI);
-    let r = A::PI_PARTS.iter().fold(z, |r, &part| {
-        let part = r.constant(part);
-        if A::PI_NEEDS_FUSED {
+    let mut r = z;
+    for part in A::PI_PARTS {
+        let part = z.constant(part);
+        r = if A::PI_NEEDS_FUSED {
             n.fused_neg_mul_add(part, r)
         } else {
             n.neg_mul_add(part, r)
-        }
-    });
+        };
+    }
     // sin(n pi + r) = (-1)^n sin r.
     let square = r * r;
     // A product, not r plus a correction, so that -0 stays -0.

@@ -83,7 +83,7 @@ fn project<S: Simd, A: Scalar, const R: usize>(
             *sum = weight.mul_add(Lanes::splat(simd, x), *sum);
         }
     }
-    for (to, sum) in to.iter_mut().step_by(stride).zip(sums) {
+    for (to, sum) in to.iter_mut().step_by(stride).zip(&sums) {
         *to = sum.register();
     }
 }
@@ -149,25 +149,29 @@ fn accumulate<S: Simd, A: Scalar, const R: usize, const O: usize>(
     first: usize,
 ) {
     let length = beta[0].len();
-    let beta = beta.map(|beta| A::registers::<S>(&beta[..length]).0);
+    let beta: [&[A::Register<S>]; O] =
+        std::array::from_fn(|o| A::registers::<S>(&beta[o][..length]).0);
     let rows: [&[A::Register<S>]; R] =
         std::array::from_fn(|r| A::registers::<S>(&hidden[r * length..(r + 1) * length]).0);
     let sums = A::registers_mut::<S>(sums).0;
     let per_line = A::LINE / (length / beta[0].len());
     let per_row = sums.len() / R;
     for lane in 0..per_line {
-        let mut partial = [[Lanes::<S, A>::splat(simd, A::zero()); O]; R];
+        let mut partial = [[Lanes::<S, A>::splat(simd, A::ZERO); O]; R];
         for index in (lane..beta[0].len()).step_by(per_line) {
-            let beta = beta.map(|beta| Lanes::new(simd, beta[index]));
-            for (partial, row) in partial.iter_mut().zip(rows) {
+            let mut weights = [Lanes::<S, A>::splat(simd, A::ZERO); O];
+            for (weight, beta) in weights.iter_mut().zip(&beta) {
+                *weight = Lanes::new(simd, beta[index]);
+            }
+            for (partial, row) in partial.iter_mut().zip(&rows) {
                 let value = Lanes::new(simd, row[index]);
-                for (sum, beta) in partial.iter_mut().zip(beta) {
-                    *sum = value.mul_add(beta, *sum);
+                for (sum, &weight) in partial.iter_mut().zip(&weights) {
+                    *sum = value.mul_add(weight, *sum);
                 }
             }
         }
-        for (r, partial) in partial.into_iter().enumerate() {
-            for (o, partial) in partial.into_iter().enumerate() {
+        for (r, partial) in partial.iter().enumerate() {
+            for (o, &partial) in partial.iter().enumerate() {
                 let sum = &mut sums[r * per_row + (first + o) * per_line + lane];
                 *sum = (Lanes::new(simd, *sum) + partial).register();
             }

@@ -69,11 +69,11 @@ impl<S: Simd, A: Real> Lanes<S, A> {
         let Some((&last, rest)) = coefficients.split_last() else {
             return self.constant(A::ZERO);
         };
-        rest.iter()
-            .rev()
-            .fold(self.constant(last), |sum, &coefficient| {
-                sum.mul_add(self, self.constant(coefficient))
-            })
+        let mut sum = self.constant(last);
+        for &coefficient in rest.iter().rev() {
+            sum = sum.mul_add(self, self.constant(coefficient));
+        }
+        sum
     }
 
     #[inline(always)]

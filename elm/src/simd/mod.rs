@@ -7,6 +7,9 @@
 //! Every level but the last has fused multiply-add and the same operations in the same order, so
 //! results there are the same bits. [`pulp::Scalar`] rounds after each multiplication: it differs
 //! by rounding, serves processors without FMA, and is what tests hold the others against.
+//!
+//! Registers must not pass through closures: those are compiled without the vector unit, and each
+//! operation in them becomes a call. Hence plain loops, and `inline(always)` throughout.
 
 mod lanes;
 mod real;
