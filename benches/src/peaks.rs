@@ -7,14 +7,14 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::timing::median_seconds;
+use crate::timing::fastest_seconds;
 
 /// Independent chains of multiply-adds: at least latency (4 or 5) times units (2), and few enough
 /// for 16 registers.
 const CHAINS: usize = 12;
 /// Steps of each chain in one call.
 const STEPS: usize = 20_000;
-const REPETITIONS: usize = 15;
+const REPETITIONS: usize = 30;
 
 macro_rules! chains {
     ($name:ident, $element:ty, $splat:ident, $mul_add:ident, $sum:ident, $lanes:ident) => {
@@ -76,7 +76,7 @@ pub fn levels() -> Vec<(&'static str, Arch)> {
 #[must_use]
 pub fn multiply_add_f64(arch: Arch) -> f64 {
     let operations = arch.dispatch(DoubleChains).0;
-    let seconds = median_seconds(REPETITIONS, || {
+    let seconds = fastest_seconds(REPETITIONS, || {
         black_box(arch.dispatch(DoubleChains));
     });
     operations as f64 / seconds
@@ -86,7 +86,7 @@ pub fn multiply_add_f64(arch: Arch) -> f64 {
 #[must_use]
 pub fn multiply_add_f32(arch: Arch) -> f64 {
     let operations = arch.dispatch(SingleChains).0;
-    let seconds = median_seconds(REPETITIONS, || {
+    let seconds = fastest_seconds(REPETITIONS, || {
         black_box(arch.dispatch(SingleChains));
     });
     operations as f64 / seconds
@@ -101,7 +101,7 @@ pub fn matrix_product(size: usize) -> f64 {
         Mat::from_fn(size, size, value),
     );
     let mut c = Mat::<f64>::zeros(size, size);
-    let seconds = median_seconds(REPETITIONS, || {
+    let seconds = fastest_seconds(REPETITIONS, || {
         matmul(
             c.as_mut(),
             Accum::Replace,
@@ -119,7 +119,7 @@ pub fn matrix_product(size: usize) -> f64 {
 pub fn read_bandwidth(bytes: usize) -> f64 {
     let values = vec![1.0_f64; bytes / size_of::<f64>()];
     let arch = Arch::new();
-    let seconds = median_seconds(REPETITIONS, || {
+    let seconds = fastest_seconds(REPETITIONS, || {
         black_box(arch.dispatch(Sum(black_box(&values))));
     });
     bytes as f64 / seconds

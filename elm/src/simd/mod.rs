@@ -14,14 +14,31 @@
 mod lanes;
 mod real;
 
-use pulp::{Arch, WithSimd};
+use std::fmt;
+
+use pulp::{Arch, Simd, WithSimd};
 
 pub(crate) use lanes::Lanes;
 pub(crate) use real::Real;
 
 /// Which vector unit to use.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub(crate) struct Level(Arch);
+
+impl fmt::Debug for Level {
+    /// The name alone: `pulp` would list every instruction set.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        struct Lanes;
+        impl WithSimd for Lanes {
+            type Output = usize;
+            #[inline(always)]
+            fn with_simd<S: Simd>(self, _: S) -> usize {
+                S::F64_LANES
+            }
+        }
+        write!(f, "{} lanes of f64", self.run(Lanes))
+    }
+}
 
 impl Level {
     /// The best that this processor has.
