@@ -18,8 +18,9 @@
 //! # Ok::<(), elm::Error>(())
 //! ```
 //!
-//! - [`ElmParams`] holds the settings, [`Elm`] the fitted network.
-//! - [`Activation`] is the neurons' function, one of seven or your own.
+//! - [`ElmParams`] holds the settings, [`Elm`] the fitted network, [`Predictor`]
+//!   its weights packed for evaluation.
+//! - [`Activation`] is the neurons' function, one of eight or your own.
 //! - [`solve`] has the solvers: equations 10 and 11 of the ELM literature, and ridge regression
 //!   with its strength chosen by exact leave-one-out, which is the default.
 //! - [`validate`] has held-out predictions in closed form, leave-one-out and k-fold.
@@ -38,6 +39,7 @@
 //! - `faer` (default): linear algebra in pure Rust.
 //! - `openblas-system`: LAPACK from the system's OpenBLAS, in place of faer. OpenBLAS is set to one
 //!   thread for the whole process: its parallel routines overflow the stack of a Rust thread.
+//! - `rayon`: prediction on several threads, [`Predictor::predict_into_parallel`].
 
 pub mod accumulate;
 pub mod activation;
@@ -47,19 +49,22 @@ mod linalg;
 pub mod metrics;
 mod model;
 pub mod persist;
+mod predictor;
 mod scalar;
 mod scaler;
+mod simd;
 pub mod solve;
 pub mod tune;
 pub mod uncertainty;
 pub mod validate;
 
 pub use accumulate::Accumulator;
-pub use activation::Activation;
+pub use activation::{Accuracy, Activation};
 pub use error::{Error, Result};
 pub use hidden::{Biases, Distribution, HiddenLayer};
 pub use linalg::backend;
 pub use model::{CheckedParams, Elm, ElmParams, Targets};
+pub use predictor::{Predictor, Scratch};
 pub use scalar::Scalar;
 pub use scaler::Scaler;
 pub use tune::Tuner;

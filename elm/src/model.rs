@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::activation::Activation;
 use crate::error::{Error, Result};
 use crate::hidden::{Biases, Distribution, HiddenLayer, Plan};
+use crate::predictor::Predictor;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
 use crate::solve::{
@@ -516,26 +517,14 @@ impl<A: Scalar> Elm<A> {
     /// [`Error::NotFinite`] for a NaN or infinity in `x`, [`Error::Overflow`] when a prediction is
     /// outside the range of the type. No rows is fine and gives no rows.
     pub fn predict(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
-        check_length("inputs", x.ncols(), self.inputs())?;
-        if x.nrows() == 0 {
-            return Ok(Array2::zeros((0, self.outputs())));
-        }
-        check_matrix("inputs", x.view())?;
-        let scaled = self
-            .scaler
-            .as_ref()
-            .map(|scaler| scaler.transform(x.view()));
-        let x = scaled.as_ref().map_or(x.view(), |scaled| scaled.view());
-        let design = design(&self.hidden, self.direct_links, x);
-        let mut out = A::product(design.view(), self.beta.view());
-        out += &self.intercept;
-        if out.iter().all(|value| value.is_finite()) {
-            Ok(out)
-        } else {
-            Err(Error::Overflow {
-                what: "a prediction",
-            })
-        }
+        self.predictor().predict(x)
+    }
+
+    /// The network packed for evaluation: for many calls, few rows at a time, threads, or
+    /// memory of the caller's own.
+    #[must_use]
+    pub fn predictor(&self) -> Predictor<A> {
+        Predictor::new(self)
     }
 
     /// The hidden-layer matrix of these inputs (the paper's $F$, equation 9): shape (rows, inputs)
@@ -590,6 +579,12 @@ impl<A: Scalar> Elm<A> {
     #[must_use]
     pub fn intercept(&self) -> ArrayView1<'_, A> {
         self.intercept.view()
+    }
+
+    /// Other output weights, for tests that compare networks in two precisions.
+    #[cfg(test)]
+    pub(crate) fn set_readout(&mut self, beta: Array2<A>, intercept: Array1<A>) {
+        (self.beta, self.intercept) = (beta, intercept);
     }
 
     /// What the solver reported.

@@ -5,10 +5,12 @@ use std::iter::Sum;
 use ndarray::NdFloat;
 use serde::{Serialize, de::DeserializeOwned};
 
+use crate::activation::Coefficients;
 use crate::linalg::Kernel;
 
-/// `f32` or `f64`. Sealed: the linear algebra behind it exists for these two.
-pub trait Scalar: NdFloat + Kernel + Sum + Serialize + DeserializeOwned {
+/// `f32` or `f64`. Sealed: the linear algebra and the vector code behind it exist for these
+/// two.
+pub trait Scalar: NdFloat + Kernel + Coefficients + Sum + Serialize + DeserializeOwned {
     /// The type's name, `"f32"` or `"f64"`.
     const NAME: &'static str;
 

@@ -87,6 +87,19 @@ impl<A: Scalar> Scaler<A> {
         out
     }
 
+    /// Standardises inputs in place, each a slice of its values.
+    pub(crate) fn transform_columns<'a>(&self, columns: impl Iterator<Item = &'a mut [A]>) {
+        for ((column, &mean), &factor) in columns.zip(&self.mean).zip(&self.factor) {
+            if factor == A::zero() {
+                column.fill(A::zero());
+            } else {
+                // Mean and factor are not folded into the weights: where the mean is large
+                // against the deviation, that would lose the digits that the difference keeps.
+                column.iter_mut().for_each(|x| *x = (*x - mean) * factor);
+            }
+        }
+    }
+
     /// Mean of each input.
     #[must_use]
     pub fn mean(&self) -> ArrayView1<'_, A> {

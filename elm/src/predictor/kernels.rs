@@ -1,0 +1,198 @@
+//! The two products of evaluation over packed weights, on vector registers.
+//!
+//! Lanes are neurons. Each sum is taken in one order that depends neither on the vector unit's
+//! width nor on how many rows are evaluated together, so a row's prediction is the same bits
+//! alone, in a batch, and on every processor with fused multiply-add.
+
+use pulp::{Simd, WithSimd};
+
+use super::packed::Packed;
+use crate::scalar::Scalar;
+use crate::simd::Lanes;
+
+/// Rows whose weighted sums are taken together, one register each.
+pub(super) const ROWS: usize = 8;
+
+/// Splits a count of rows into blocks of [`ROWS`] and single ones: (first row, rows).
+pub(super) fn row_blocks(rows: usize) -> impl Iterator<Item = (usize, usize)> {
+    let whole = rows / ROWS * ROWS;
+    (0..whole)
+        .step_by(ROWS)
+        .map(|first| (first, ROWS))
+        .chain((whole..rows).map(|first| (first, 1)))
+}
+
+/// Weighted sums $x \cdot \omega_k + b_k$ of a range of panels for a tile of rows.
+pub(super) struct Project<'a, A: Scalar> {
+    pub(super) packed: &'a Packed<A>,
+    pub(super) first_panel: usize,
+    pub(super) panels: usize,
+    pub(super) rows: usize,
+    /// Inputs by [`row_blocks`], and in a block input by input.
+    pub(super) inputs: &'a [A],
+    /// Receives `rows` rows of `panels` lines.
+    pub(super) hidden: &'a mut [A],
+}
+
+impl<A: Scalar> WithSimd for Project<'_, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let inputs = self.packed.inputs;
+        let weights = self.packed.hidden(self.first_panel, self.panels);
+        let hidden = A::registers_mut::<S>(self.hidden).0;
+        let per_line = A::registers::<S>(&weights[..A::LINE]).0.len();
+        let per_row = self.panels * per_line;
+        for (panel, weights) in weights.chunks_exact((inputs + 1) * A::LINE).enumerate() {
+            let weights = A::registers::<S>(weights).0;
+            for (first, rows) in row_blocks(self.rows) {
+                let x = &self.inputs[first * inputs..(first + rows) * inputs];
+                for lane in 0..per_line {
+                    let to = &mut hidden[first * per_row + panel * per_line + lane..];
+                    if rows == ROWS {
+                        project::<S, A, ROWS>(simd, weights, per_line, lane, x, to, per_row);
+                    } else {
+                        project::<S, A, 1>(simd, weights, per_line, lane, x, to, per_row);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// One register of neurons for `R` rows.
+#[inline(always)]
+fn project<S: Simd, A: Scalar, const R: usize>(
+    simd: S,
+    weights: &[A::Register<S>],
+    per_line: usize,
+    lane: usize,
+    x: &[A],
+    to: &mut [A::Register<S>],
+    stride: usize,
+) {
+    let mut lines = weights.chunks_exact(per_line);
+    let Some(biases) = lines.next() else {
+        return;
+    };
+    let mut sums = [Lanes::<S, A>::new(simd, biases[lane]); R];
+    for (line, x) in lines.zip(x.as_chunks::<R>().0) {
+        let weight = Lanes::new(simd, line[lane]);
+        for (sum, &x) in sums.iter_mut().zip(x) {
+            *sum = weight.mul_add(Lanes::splat(simd, x), *sum);
+        }
+    }
+    for (to, sum) in to.iter_mut().step_by(stride).zip(&sums) {
+        *to = sum.register();
+    }
+}
+
+/// Adds the contribution of a range of panels to every output: $\beta^T h$, still in lanes.
+pub(super) struct Accumulate<'a, A: Scalar> {
+    pub(super) packed: &'a Packed<A>,
+    pub(super) first_panel: usize,
+    pub(super) panels: usize,
+    /// Rows of `panels` lines.
+    pub(super) hidden: &'a [A],
+    /// Per row a line for each output.
+    pub(super) sums: &'a mut [A],
+}
+
+impl<A: Scalar> WithSimd for Accumulate<'_, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let (panels, outputs) = (self.panels, self.packed.outputs);
+        let row_length = panels * A::LINE;
+        let sums_length = outputs * A::LINE;
+        let beta = |output| self.packed.beta(output, self.first_panel, panels);
+        // Three outputs at once, so that a hidden value is loaded once for all of them.
+        let triples = outputs / 3 * 3;
+        for output in (0..triples).step_by(3) {
+            let beta = [beta(output), beta(output + 1), beta(output + 2)];
+            let mut hidden = self.hidden.chunks_exact(4 * row_length);
+            let mut sums = self.sums.chunks_exact_mut(4 * sums_length);
+            for (hidden, sums) in hidden.by_ref().zip(sums.by_ref()) {
+                accumulate::<S, A, 4, 3>(simd, beta, hidden, sums, output);
+            }
+            let hidden = hidden.remainder().chunks_exact(row_length);
+            let sums = sums.into_remainder().chunks_exact_mut(sums_length);
+            for (hidden, sums) in hidden.zip(sums) {
+                accumulate::<S, A, 1, 3>(simd, beta, hidden, sums, output);
+            }
+        }
+        for output in triples..outputs {
+            let beta = [beta(output)];
+            let mut hidden = self.hidden.chunks_exact(8 * row_length);
+            let mut sums = self.sums.chunks_exact_mut(8 * sums_length);
+            for (hidden, sums) in hidden.by_ref().zip(sums.by_ref()) {
+                accumulate::<S, A, 8, 1>(simd, beta, hidden, sums, output);
+            }
+            let hidden = hidden.remainder().chunks_exact(row_length);
+            let sums = sums.into_remainder().chunks_exact_mut(sums_length);
+            for (hidden, sums) in hidden.zip(sums) {
+                accumulate::<S, A, 1, 1>(simd, beta, hidden, sums, output);
+            }
+        }
+    }
+}
+
+/// `R` rows and `O` outputs from `first` on.
+#[inline(always)]
+fn accumulate<S: Simd, A: Scalar, const R: usize, const O: usize>(
+    simd: S,
+    beta: [&[A]; O],
+    hidden: &[A],
+    sums: &mut [A],
+    first: usize,
+) {
+    let length = beta[0].len();
+    let beta: [&[A::Register<S>]; O] =
+        std::array::from_fn(|o| A::registers::<S>(&beta[o][..length]).0);
+    let rows: [&[A::Register<S>]; R] =
+        std::array::from_fn(|r| A::registers::<S>(&hidden[r * length..(r + 1) * length]).0);
+    let sums = A::registers_mut::<S>(sums).0;
+    let per_line = A::LINE / (length / beta[0].len());
+    let per_row = sums.len() / R;
+    for lane in 0..per_line {
+        let mut partial = [[Lanes::<S, A>::splat(simd, A::ZERO); O]; R];
+        for index in (lane..beta[0].len()).step_by(per_line) {
+            let mut weights = [Lanes::<S, A>::splat(simd, A::ZERO); O];
+            for (weight, beta) in weights.iter_mut().zip(&beta) {
+                *weight = Lanes::new(simd, beta[index]);
+            }
+            for (partial, row) in partial.iter_mut().zip(&rows) {
+                let value = Lanes::new(simd, row[index]);
+                for (sum, &weight) in partial.iter_mut().zip(&weights) {
+                    *sum = value.mul_add(weight, *sum);
+                }
+            }
+        }
+        for (r, partial) in partial.iter().enumerate() {
+            for (o, &partial) in partial.iter().enumerate() {
+                let sum = &mut sums[r * per_row + (first + o) * per_line + lane];
+                *sum = (Lanes::new(simd, *sum) + partial).register();
+            }
+        }
+    }
+}
+
+/// The sum of a line, halves added to each other.
+#[inline]
+pub(super) fn sum_of_line<A: Scalar>(line: &[A]) -> A {
+    // 16 values of f32 or 8 of f64 in 64 bytes.
+    let mut buffer = [A::zero(); 16];
+    for (to, &from) in buffer.iter_mut().zip(line) {
+        *to = from;
+    }
+    let mut width = A::LINE;
+    while width > 1 {
+        width /= 2;
+        for i in 0..width {
+            buffer[i] += buffer[i + width];
+        }
+    }
+    buffer[0]
+}
