@@ -69,3 +69,8 @@ pub use scalar::Scalar;
 pub use scaler::Scaler;
 pub use tune::Tuner;
 pub use uncertainty::UncertainElm;
+
+// The README's code is compiled and run with the documentation tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
