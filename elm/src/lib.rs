@@ -39,7 +39,7 @@
 //! - `faer` (default): linear algebra in pure Rust.
 //! - `openblas-system`: LAPACK from the system's OpenBLAS, in place of faer. OpenBLAS is set to one
 //!   thread for the whole process: its parallel routines overflow the stack of a Rust thread.
-//! - `rayon`: prediction on several threads, [`Predictor::predict_into_parallel`].
+//! - `rayon`: prediction on several threads, `Predictor::predict_into_parallel`.
 
 pub mod accumulate;
 pub mod activation;

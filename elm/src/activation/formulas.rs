@@ -122,7 +122,7 @@ pub(super) fn hard_limit<S: Simd, A: Coefficients>(z: Lanes<S, A>) -> Lanes<S, A
     z.where_at_least(A::ZERO, one, z.where_less(A::ZERO, zero, z))
 }
 
-/// [`tanh`] with an absolute error of 4e-7, at about half the cost.
+/// [`tanh`] with an absolute error of 4e-7, and of 4.5e-7 in `f32`.
 #[inline(always)]
 pub(super) fn tanh_fast<S: Simd, A: Coefficients>(z: Lanes<S, A>) -> Lanes<S, A> {
     let x = z.abs().at_most(A::TANH_FAST_LIMIT);

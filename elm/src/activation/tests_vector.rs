@@ -185,7 +185,7 @@ fn with_references(
     let mut consts = Consts::new().unwrap();
     arguments
         .filter(|z| z.is_finite())
-        // Beyond, values are 0, 1/2, 1 or the argument: see the next but one test.
+        // Beyond, values are 0, 1/2, 1 or the argument: see `tiny_and_huge_arguments_agree_with_the_standard_library`.
         .filter(|z| (1e-20..1e9).contains(&z.abs()))
         .map(|z| (z, reference(function, z, &mut consts)))
         .collect()
@@ -228,6 +228,26 @@ fn double_precision_values_are_within_the_stated_ulp() {
                 error <= FAST_ERROR,
                 "{function} of {z:e}: {error:e}, {level:?}"
             );
+        }
+    }
+}
+
+#[test]
+fn tiny_and_huge_arguments_agree_with_the_standard_library() {
+    let arguments: Vec<_> = special_arguments()
+        .into_iter()
+        .filter(|z| z.is_finite() && !(1e-20..1e9).contains(&z.abs()))
+        .collect();
+    for level in Level::all() {
+        for function in rounded::<f64>() {
+            let values = by_vector(level, &function, Accuracy::Full, &arguments);
+            for (&z, value) in arguments.iter().zip(values) {
+                // The standard library is within 1 unit there.
+                let expected = function.apply(z);
+                let bound = (FULL_ULP + 1.0) * ulp(expected, 53, -1022);
+                let error = (value - expected).abs();
+                assert!(error <= bound, "{function} of {z:e}: {value:e}, {level:?}");
+            }
         }
     }
 }

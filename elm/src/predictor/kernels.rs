@@ -13,6 +13,9 @@ use crate::simd::Lanes;
 /// Rows whose weighted sums are taken together, one register each.
 pub(super) const ROWS: usize = 8;
 
+/// Panels whose weighted sums are taken together for a row by itself.
+const PANELS: usize = 4;
+
 /// Splits a count of rows into blocks of [`ROWS`] and single ones: (first row, rows).
 pub(super) fn row_blocks(rows: usize) -> impl Iterator<Item = (usize, usize)> {
     let whole = rows / ROWS * ROWS;
@@ -39,52 +42,83 @@ impl<A: Scalar> WithSimd for Project<'_, A> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let inputs = self.packed.inputs;
-        let weights = self.packed.hidden(self.first_panel, self.panels);
-        let hidden = A::registers_mut::<S>(self.hidden).0;
+        let (inputs, panels) = (self.packed.inputs, self.panels);
+        let weights = self.packed.hidden(self.first_panel, panels);
         let per_line = A::registers::<S>(&weights[..A::LINE]).0.len();
-        let per_row = self.panels * per_line;
-        for (panel, weights) in weights.chunks_exact((inputs + 1) * A::LINE).enumerate() {
-            let weights = A::registers::<S>(weights).0;
-            for (first, rows) in row_blocks(self.rows) {
-                let x = &self.inputs[first * inputs..(first + rows) * inputs];
+        let weights = A::registers::<S>(weights).0;
+        let hidden = A::registers_mut::<S>(self.hidden).0;
+        let (per_panel, per_row) = ((inputs + 1) * per_line, panels * per_line);
+        let whole = self.rows / ROWS * ROWS;
+        for (panel, weights) in weights.chunks_exact(per_panel).enumerate() {
+            for first in (0..whole).step_by(ROWS) {
+                let x = &self.inputs[first * inputs..][..ROWS * inputs];
                 for lane in 0..per_line {
                     let to = &mut hidden[first * per_row + panel * per_line + lane..];
-                    if rows == ROWS {
-                        project::<S, A, ROWS>(simd, weights, per_line, lane, x, to, per_row);
+                    let weights = &weights[lane..];
+                    project::<S, A, ROWS, 1>(simd, weights, per_line, 0, x, to, per_row, 0);
+                }
+            }
+        }
+        // A single row has no neighbours to hide latency with; it takes panels together instead.
+        for row in whole..self.rows {
+            let x = &self.inputs[row * inputs..][..inputs];
+            let hidden = &mut hidden[row * per_row..][..per_row];
+            let mut panel = 0;
+            while panel < panels {
+                let together = if panel + PANELS <= panels { PANELS } else { 1 };
+                for lane in 0..per_line {
+                    let to = &mut hidden[panel * per_line + lane..];
+                    let weights = &weights[panel * per_panel + lane..];
+                    if together == PANELS {
+                        project::<S, A, 1, PANELS>(
+                            simd, weights, per_line, per_panel, x, to, 0, per_line,
+                        );
                     } else {
-                        project::<S, A, 1>(simd, weights, per_line, lane, x, to, per_row);
+                        project::<S, A, 1, 1>(simd, weights, per_line, 0, x, to, 0, 0);
                     }
                 }
+                panel += together;
             }
         }
     }
 }
 
-/// One register of neurons for `R` rows.
+/// One register of neurons in each of `P` panels for `R` rows. In `weights` inputs are `per_line`
+/// apart and panels `per_panel`; in `to`, rows `row_stride` and panels `panel_stride`.
 #[inline(always)]
-fn project<S: Simd, A: Scalar, const R: usize>(
+#[allow(clippy::too_many_arguments)]
+fn project<S: Simd, A: Scalar, const R: usize, const P: usize>(
     simd: S,
     weights: &[A::Register<S>],
     per_line: usize,
-    lane: usize,
+    per_panel: usize,
     x: &[A],
     to: &mut [A::Register<S>],
-    stride: usize,
+    row_stride: usize,
+    panel_stride: usize,
 ) {
-    let mut lines = weights.chunks_exact(per_line);
-    let Some(biases) = lines.next() else {
-        return;
-    };
-    let mut sums = [Lanes::<S, A>::new(simd, biases[lane]); R];
-    for (line, x) in lines.zip(x.as_chunks::<R>().0) {
-        let weight = Lanes::new(simd, line[lane]);
-        for (sum, &x) in sums.iter_mut().zip(x) {
-            *sum = weight.mul_add(Lanes::splat(simd, x), *sum);
+    let mut sums = [[Lanes::<S, A>::splat(simd, A::ZERO); P]; R];
+    for sums in &mut sums {
+        for (panel, sum) in sums.iter_mut().enumerate() {
+            *sum = Lanes::new(simd, weights[panel * per_panel]);
         }
     }
-    for (to, sum) in to.iter_mut().step_by(stride).zip(&sums) {
-        *to = sum.register();
+    for (input, x) in x.as_chunks::<R>().0.iter().enumerate() {
+        let mut line = [Lanes::<S, A>::splat(simd, A::ZERO); P];
+        for (panel, weight) in line.iter_mut().enumerate() {
+            *weight = Lanes::new(simd, weights[(input + 1) * per_line + panel * per_panel]);
+        }
+        for (sums, &x) in sums.iter_mut().zip(x) {
+            let x = Lanes::splat(simd, x);
+            for (sum, &weight) in sums.iter_mut().zip(&line) {
+                *sum = weight.mul_add(x, *sum);
+            }
+        }
+    }
+    for (row, sums) in sums.iter().enumerate() {
+        for (panel, sum) in sums.iter().enumerate() {
+            to[row * row_stride + panel * panel_stride] = sum.register();
+        }
     }
 }
 
