@@ -2,7 +2,7 @@
 
 use std::iter::Sum;
 
-use ndarray::NdFloat;
+use ndarray::{ArrayView, CowArray, Dimension, NdFloat};
 use serde::{Serialize, de::DeserializeOwned};
 
 use crate::activation::Coefficients;
@@ -19,6 +19,9 @@ pub trait Scalar: NdFloat + Kernel + Coefficients + Sum + Serialize + Deserializ
 
     /// This value as `f64`; exact.
     fn as_f64(self) -> f64;
+
+    /// These values as `f64`: a copy of `f32`, the array itself of `f64`.
+    fn widen<D: Dimension>(values: ArrayView<'_, Self, D>) -> CowArray<'_, f64, D>;
 }
 
 impl Scalar for f32 {
@@ -32,6 +35,10 @@ impl Scalar for f32 {
     fn as_f64(self) -> f64 {
         f64::from(self)
     }
+
+    fn widen<D: Dimension>(values: ArrayView<'_, Self, D>) -> CowArray<'_, f64, D> {
+        values.mapv(f64::from).into()
+    }
 }
 
 impl Scalar for f64 {
@@ -43,5 +50,9 @@ impl Scalar for f64 {
 
     fn as_f64(self) -> f64 {
         self
+    }
+
+    fn widen<D: Dimension>(values: ArrayView<'_, Self, D>) -> CowArray<'_, f64, D> {
+        values.into()
     }
 }

@@ -10,7 +10,7 @@
 //! let t = h.dot(&array![[1.0], [-2.0], [0.5]]) + 3.0;
 //! let validator = Validator::new(&LeastSquares::new(&h, &t)?.intercept(true))?;
 //! let folds = assign_folds(12, 4, 0)?;
-//! let path = validator.k_fold_path(&folds, &Ridge::candidates::<f64>())?;
+//! let path = validator.k_fold_path(&folds, &Ridge::candidates())?;
 //! let held_out = validator.k_fold(&folds, &path.best())?;
 //! assert!(held_out.rmse()[0] < 1e-6);
 //! # Ok::<(), elm::Error>(())

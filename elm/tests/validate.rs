@@ -227,7 +227,7 @@ fn a_path_has_the_scores_of_its_strengths_and_finds_the_best() {
     let problem = Problem::noisy(normal::<f64>(30, 20, 1), 2, 3.0, 2).weighted(weights(30, 3));
     let validator = Validator::new(&problem.view()).unwrap();
     let folds = assign_folds(30, 5, 1).unwrap();
-    let lambdas = Ridge::candidates::<f64>();
+    let lambdas = Ridge::candidates();
     for (path, score) in [
         (
             validator.k_fold_path(&folds, &lambdas).unwrap(),

@@ -1,17 +1,74 @@
-//! placeholder
+//! Every solver on least-squares problems that break linear algebra: the tables and the curve of
+//! `docs/stability.md`.
+//!
+//! `cargo run --release -p elm-benches --bin stress -- --out docs/stability.md`; for OpenBLAS with
+//! `--no-default-features --features openblas-system` before the `--`.
+
 #![allow(clippy::print_stdout)]
-use elm_benches::stress::*;
-fn main() {
-    let settings = Settings { seeds: 5, methods: Method::ALL.to_vec(), reference: std::env::args().nth(1).is_some() };
-    for precision in [Precision::F64, Precision::F32] {
-        println!("{precision:?}");
-        for case in cases::CASES {
-            let start = std::time::Instant::now();
-            let records = run(&[*case], precision, &settings);
-            println!("{:40} {:?} {:.2}s", case.name, records[0].shape, start.elapsed().as_secs_f64());
-            for r in records {
-                println!("      {:15} rmse {:9.2e} ratio {:8.3} worst {:9.3} ref {:8.1e} {} {}", r.solver, r.rmse.unwrap_or(-1.0), r.ratio_to_oracle.unwrap_or(-1.0), r.worst_ratio.unwrap_or(-1.0), r.reference_error.unwrap_or(-1.0), r.report.map_or(String::new(), |r| format!("rank {:?} cond {:.1e} lambda {:.1e} dof {:.1} {:?}", r.rank, r.condition.unwrap_or(0.0), r.lambda, r.degrees_of_freedom, r.route)), r.error.unwrap_or_default());
-            }
+
+use std::error::Error;
+use std::path::PathBuf;
+use std::{fs, io};
+
+use clap::{Parser, ValueEnum};
+use elm_benches::stress::cases::CASES;
+use elm_benches::stress::{Method, Precision, Record, Settings, curve, report, run};
+
+/// Hard least-squares problems: every solver against an oracle and a double-double reference.
+#[derive(Debug, Parser)]
+struct Arguments {
+    /// What to write.
+    #[arg(long, value_enum, default_value_t = Format::Table)]
+    format: Format,
+    /// Where to: JSON becomes the file, tables become a section of it, one per back end. Without
+    /// it everything goes to standard output.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Also draw the curve of error against condition number, as SVG.
+    #[arg(long, value_name = "FILE")]
+    curve: Option<PathBuf>,
+    /// Seeds per case.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..))]
+    seeds: u64,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Format {
+    Table,
+    Json,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments = Arguments::parse();
+    let settings = Settings {
+        seeds: arguments.seeds,
+        methods: Method::ALL.to_vec(),
+        reference: true,
+    };
+    let records: Vec<Record> = [Precision::F64, Precision::F32]
+        .into_iter()
+        .flat_map(|precision| run(CASES, precision, &settings))
+        .collect();
+    let text = match arguments.format {
+        Format::Json => report::json(&records)?,
+        Format::Table => report::markdown(&records, arguments.seeds),
+    };
+    match (&arguments.out, arguments.format) {
+        (None, _) => print!("{text}"),
+        (Some(path), Format::Json) => fs::write(path, text)?,
+        (Some(path), Format::Table) => {
+            let document = match fs::read_to_string(path) {
+                Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
+                other => other?,
+            };
+            fs::write(
+                path,
+                report::replace_section(&document, elm::backend(), &text),
+            )?;
         }
     }
+    if let Some(path) = &arguments.curve {
+        fs::write(path, curve::svg(&curve::curves(5))?)?;
+    }
+    Ok(())
 }

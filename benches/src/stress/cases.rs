@@ -218,7 +218,8 @@ impl Draw {
     /// Thirty different smooth functions, the later ones with more noise.
     fn many_outputs(&mut self, rows: usize, neurons: usize, outputs: usize) -> Problem {
         let z = self.uniform(rows + TEST_ROWS, 4);
-        let signal = (z.dot(&(self.normal(4, outputs) * 1.5)) + self.normal(1, outputs)).mapv(f64::sin);
+        let signal =
+            (z.dot(&(self.normal(4, outputs) * 1.5)) + self.normal(1, outputs)).mapv(f64::sin);
         let noise = Array1::logspace(10.0, -3.0, 0.0, outputs);
         let error = self.normal(z.nrows(), outputs) * signal.std_axis(Axis(0), 0.0) * noise;
         split(network(neurons), &z, &(signal + error), rows)
@@ -262,8 +263,7 @@ impl Draw {
     }
 }
 
-/// A matrix of the given condition on `rows` training rows, without noise, for the curve of error
-/// against condition.
+/// A matrix of this condition with a smooth target, for the curve of error against condition.
 #[must_use]
 pub fn conditioned(condition: f64, seed: u64) -> Problem {
     let mut draw = Draw(ChaCha8Rng::seed_from_u64(seed));

@@ -15,10 +15,10 @@
 //!   the same strength, solved in double-double arithmetic (about 31 digits).
 
 pub mod cases;
-//pub mod curve;
+pub mod curve;
 pub mod oracle;
 pub mod reference;
-//pub mod report;
+pub mod report;
 pub mod run;
 
 pub use cases::{Case, Problem};

@@ -110,9 +110,9 @@ pub struct Record {
 /// The part of a [`Diagnosis`] that a table has room for; of the first output.
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
-    /// Numerical rank.
+    /// Numerical rank, where the route finds it.
     pub rank: Option<usize>,
-    /// Condition number.
+    /// Condition number, with it.
     pub condition: Option<f64>,
     /// Strength of ridge, relative.
     pub lambda: f64,
@@ -180,7 +180,12 @@ fn records<A: Scalar>(case: &Case, precision: Precision, settings: &Settings) ->
             report: outcome.map(|o| o.report.clone()),
         })
     };
-    settings.methods.iter().enumerate().filter_map(of_method).collect()
+    settings
+        .methods
+        .iter()
+        .enumerate()
+        .filter_map(of_method)
+        .collect()
 }
 
 /// One method at one seed.
@@ -235,7 +240,10 @@ impl<A: Scalar> Task<A> {
     }
 
     fn trials(&self, methods: &[Method], compare: bool) -> Vec<Trial> {
-        let auto = self.params.as_ref().map(|params| params.fit(&self.train, &self.targets));
+        let auto = self
+            .params
+            .as_ref()
+            .map(|params| params.fit(&self.train, &self.targets));
         let network = match (&self.params, &auto) {
             (Some(_), Some(Ok(network))) => Ok(Some(network.clone())),
             // The layer is the same whatever the solver.
@@ -276,7 +284,11 @@ impl<A: Scalar> Task<A> {
                     let intercept = self.params.is_some() && method != Method::Inverse;
                     let hidden = wide_hidden.view();
                     let other = reference_of(
-                        &fit.diagnosis, hidden, targets.view(), wide_test.view(), intercept,
+                        &fit.diagnosis,
+                        hidden,
+                        targets.view(),
+                        wide_test.view(),
+                        intercept,
                     )?;
                     Some(distance(&fit.predicted, &other))
                 });
@@ -355,7 +367,11 @@ pub(super) fn reference_of(
         return None;
     }
     let largest = diagnosis.largest_singular_value;
-    let lambda: Vec<f64> = diagnosis.lambda.iter().map(|l| l * largest * largest).collect();
+    let lambda: Vec<f64> = diagnosis
+        .lambda
+        .iter()
+        .map(|l| l * largest * largest)
+        .collect();
     reference::predict(hidden, targets, test, &lambda, intercept)
 }
 
@@ -363,12 +379,18 @@ pub(super) fn reference_of(
 pub(super) fn distance(a: &Array2<f64>, b: &Array2<f64>) -> f64 {
     let scale = root_mean_square(b.view());
     let difference = root_mean_square((a - b).view());
-    if scale > 0.0 { difference / scale } else { difference }
+    if scale > 0.0 {
+        difference / scale
+    } else {
+        difference
+    }
 }
 
 fn root_mean_square(a: ArrayView2<'_, f64>) -> f64 {
     let squares = a.mapv(|v| v * v);
-    let columns = squares.mean_axis(Axis(0)).and_then(|columns| columns.mean());
+    let columns = squares
+        .mean_axis(Axis(0))
+        .and_then(|columns| columns.mean());
     columns.unwrap_or(f64::NAN).sqrt()
 }
 
@@ -385,10 +407,11 @@ fn unit(magnitude: Magnitude, single: bool) -> f64 {
         (Magnitude::Subnormal, false) => -1056,
         (Magnitude::Subnormal, true) => -136,
     };
-    2.0_f64.powi(exponent)
+    // Not powi, which may go by way of 2^1056.
+    f64::from(exponent).exp2()
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;
     match values.len() {

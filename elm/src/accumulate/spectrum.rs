@@ -73,13 +73,19 @@ impl<A: Scalar> Accumulator<A> {
                 *scale *= shrunk;
             }
         }
+        // The column of ones is as long as the root of the weights' sum.
+        let total_weight = if self.intercept {
+            (self.triangle[[0, 0]] * self.scales[0]).powi(2)
+        } else {
+            A::one()
+        };
         let frame = Frame {
             rows,
             weighted_rows: usize::try_from(self.weighted_rows).unwrap_or(usize::MAX),
             intercept: self.intercept,
             root_weights: Array1::zeros(0),
             weight_scale: A::one(),
-            total_weight: A::one(),
+            total_weight,
             hidden_mean,
             target_mean,
             hidden_scale,

@@ -69,6 +69,7 @@ pub struct Diagnosis {
     pub residual_norm: Vec<f64>,
     /// Euclidean norm of the output weights.
     pub beta_norm: Vec<f64>,
-    /// Leave-one-out root mean squared error, where the solver computed it.
+    /// Leave-one-out root mean squared error, where the solver computed it; with what rounding is
+    /// expected to add to it (see [`Ridge`](crate::solve::Ridge)).
     pub leave_one_out: Option<Vec<f64>>,
 }

@@ -44,6 +44,13 @@ impl<A: Scalar> Frame<A> {
         beta
     }
 
+    /// The sum of squares of each column of the scaled matrix before it was centred.
+    pub(crate) fn lengths(&self, centred: ArrayView2<'_, A>) -> Array1<A> {
+        let spread = centred.map_axis(Axis(0), |column| column.dot(&column));
+        let mean = self.hidden_mean.mapv(|m| m / self.hidden_scale);
+        spread + mean.mapv_into(|m| m * m * self.total_weight)
+    }
+
     /// The constant of each output that goes with these output weights.
     pub(crate) fn constant(&self, beta: &Array2<A>) -> Array1<A> {
         &self.target_mean - &self.hidden_mean.dot(beta)

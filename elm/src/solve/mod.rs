@@ -155,6 +155,17 @@ pub struct Solution<A: Scalar> {
     pub diagnosis: Diagnosis,
 }
 
+impl Solution<f64> {
+    /// Rounded to `A`.
+    fn narrow<A: Scalar>(self) -> Solution<A> {
+        Solution {
+            beta: self.beta.mapv_into_any(A::from_f64),
+            intercept: self.intercept.mapv_into_any(A::from_f64),
+            diagnosis: self.diagnosis,
+        }
+    }
+}
+
 /// One of the solvers, with its settings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -27,11 +27,15 @@ pub enum Lambda {
 }
 
 /// Ridge regression (Tikhonov regularisation), one factorisation for all outputs and all
-/// candidate strengths.
+/// candidate strengths. Each output gets its own unless [`shared`](Ridge::shared) is set.
 ///
-/// Candidates lie four to a decade from [`Ridge::FLOOR`] (in `f32` from 1e-7: below that,
-/// predictions lose more to rounding than any fit can gain) to 100. Each output gets its own
-/// unless [`shared`](Ridge::shared) is set.
+/// A strength that is not given is searched for from where everything is held back to where
+/// nothing is. The score of a candidate is its held-out squared error plus the error that rounding
+/// is to be expected to leave in the predictions, $u^2 \sum_k \lVert h_k \rVert^2
+/// \beta_k^2$ over the columns $h_k$ of the hidden-layer matrix: without it noise-free targets
+/// would call for weights so large that the type cannot carry them. The search computes in `f64`
+/// whatever the type, since an ELM's directions fall far below the resolution of `f32`; $u$
+/// is that of the type.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Ridge {
     lambda: Lambda,
@@ -39,8 +43,9 @@ pub struct Ridge {
 }
 
 impl Ridge {
-    /// The weakest regularisation that is chosen by itself.
-    pub const FLOOR: f64 = 1e-12;
+    /// The weakest regularisation that is chosen by itself, about the square of `f64`'s epsilon: all
+    /// directions that it would affect are lost to rounding.
+    pub const FLOOR: f64 = 1e-31;
 
     /// A given strength, relative to the largest squared singular value.
     ///
@@ -86,15 +91,13 @@ impl Ridge {
         self.lambda
     }
 
-    /// The strengths that are tried, rising; see [`Ridge`].
+    /// The strengths that may be chosen, rising: four to a decade from [`Ridge::FLOOR`] to 100.
+    ///
+    /// Of those a search leaves out the many that are one fit: all that hold back less than
+    /// rounding error of the smallest direction, and most that hold back less than 1 % of it.
     #[must_use]
-    pub fn candidates<A: Scalar>() -> Vec<f64> {
-        let floor = Self::FLOOR.max(A::epsilon().as_f64());
-        let steps = 4.0;
-        let first = (floor.log10() * steps).ceil() as i32;
-        (first..=8)
-            .map(|step| 10.0_f64.powf(f64::from(step) / steps))
-            .collect()
+    pub fn candidates() -> Vec<f64> {
+        grid(FIRST_STEP).map(strength).collect()
     }
 
     pub(crate) fn check(&self) -> Result<()> {
@@ -121,21 +124,34 @@ impl Ridge {
                 }
                 Ok(self.solve_spectrum(&Spectrum::from_prepared(prepared)?))
             }
-            Lambda::Gcv => Ok(self.solve_spectrum(&Spectrum::new(problem)?)),
-            Lambda::LeaveOneOut => {
-                let rows = RowSpectrum::new(problem)?;
-                let (lambda, errors) = self.by_leave_one_out(&rows);
-                // Without its only row a problem has nothing to place an intercept by.
-                let defined = rows.spectrum.can_lose_a_row();
-                let errors = defined.then_some(errors);
-                Ok(answer(
-                    &rows.spectrum,
-                    Reason::StrengthSearch,
-                    &lambda,
-                    errors,
-                ))
+            Lambda::Gcv | Lambda::LeaveOneOut => {
+                let hidden = A::widen(problem.hidden);
+                let targets = A::widen(problem.targets);
+                let weights = problem.weights.map(A::widen);
+                let wide = LeastSquares {
+                    hidden: hidden.view(),
+                    targets: targets.view(),
+                    weights: weights.as_ref().map(|weights| weights.view()),
+                    intercept: problem.intercept,
+                };
+                Ok(self.search(&wide, unit_roundoff::<A>())?.narrow())
             }
         }
+    }
+
+    /// The answer by the best strength for predictions in arithmetic of this unit roundoff.
+    fn search(self, problem: &LeastSquares<'_, f64>, roundoff: f64) -> Result<Solution<f64>> {
+        let reason = Reason::StrengthSearch;
+        if self.lambda == Lambda::Gcv {
+            let spectrum = Spectrum::new(problem)?;
+            let lambda = self.by_gcv(&spectrum, roundoff);
+            return Ok(answer(&spectrum, reason, &lambda, None));
+        }
+        let rows = RowSpectrum::new(problem)?;
+        let (lambda, errors) = self.by_leave_one_out(&rows, roundoff);
+        // Without its only row a problem has nothing to place an intercept by.
+        let errors = rows.spectrum.can_lose_a_row().then_some(errors);
+        Ok(answer(&rows.spectrum, reason, &lambda, errors))
     }
 
     /// Solves without the rows, from which leave-one-out would choose: by generalised
@@ -143,7 +159,10 @@ impl Ridge {
     pub(super) fn solve_spectrum<A: Scalar>(self, spectrum: &Spectrum<A>) -> Solution<A> {
         let (reason, lambda) = match self.lambda {
             Lambda::Relative(lambda) => (Reason::WeakRidge, vec![lambda; spectrum.c.ncols()]),
-            Lambda::Gcv | Lambda::LeaveOneOut => (Reason::StrengthSearch, self.by_gcv(spectrum)),
+            Lambda::Gcv | Lambda::LeaveOneOut => {
+                let lambda = self.by_gcv(spectrum, unit_roundoff::<A>());
+                (Reason::StrengthSearch, lambda)
+            }
         };
         answer(spectrum, reason, &lambda, None)
     }
@@ -162,22 +181,26 @@ impl Ridge {
     pub(crate) fn strengths<A: Scalar>(self, rows: &RowSpectrum<A>) -> Vec<f64> {
         match self.lambda {
             Lambda::Relative(lambda) => vec![lambda; rows.spectrum.c.ncols()],
-            Lambda::Gcv => self.by_gcv(&rows.spectrum),
-            Lambda::LeaveOneOut => self.by_leave_one_out(rows).0,
+            Lambda::Gcv => self.by_gcv(&rows.spectrum, unit_roundoff::<A>()),
+            Lambda::LeaveOneOut => self.by_leave_one_out(rows, unit_roundoff::<A>()).0,
         }
     }
 
-    fn by_gcv<A: Scalar>(self, spectrum: &Spectrum<A>) -> Vec<f64> {
-        let candidates = Self::candidates::<A>();
-        let scores = gcv_scores(spectrum, &candidates);
+    fn by_gcv<A: Scalar>(self, spectrum: &Spectrum<A>, roundoff: f64) -> Vec<f64> {
+        let candidates = distinct(spectrum);
+        let scores = gcv_scores(spectrum, &candidates, roundoff);
         let chosen = self.choose(spectrum, &scores);
         chosen.iter().map(|&i| candidates[i]).collect()
     }
 
     /// Strengths and leave-one-out errors.
-    fn by_leave_one_out<A: Scalar>(self, rows: &RowSpectrum<A>) -> (Vec<f64>, Vec<f64>) {
-        let candidates = Self::candidates::<A>();
-        let scores = leave_one_out_scores(rows, &candidates);
+    fn by_leave_one_out<A: Scalar>(
+        self,
+        rows: &RowSpectrum<A>,
+        roundoff: f64,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let candidates = distinct(&rows.spectrum);
+        let scores = leave_one_out_scores(rows, &candidates, roundoff);
         let total = rows.spectrum.total_weight();
         let chosen = self.choose(&rows.spectrum, &scores);
         chosen
@@ -216,6 +239,42 @@ impl Ridge {
     }
 }
 
+const STEPS_PER_DECADE: i32 = 4;
+/// Of the weakest and the strongest candidate.
+const FIRST_STEP: i32 = -31 * STEPS_PER_DECADE;
+const LAST_STEP: i32 = 2 * STEPS_PER_DECADE;
+
+fn grid(first: i32) -> impl Iterator<Item = i32> {
+    first..=LAST_STEP
+}
+
+fn strength(step: i32) -> f64 {
+    10.0_f64.powf(f64::from(step) / f64::from(STEPS_PER_DECADE))
+}
+
+/// The candidates that make a difference to this problem, rising.
+fn distinct<A: Scalar>(spectrum: &Spectrum<A>) -> Vec<f64> {
+    let smallest = match (spectrum.s.first(), spectrum.s.last()) {
+        (Some(&first), Some(&last)) => (last / first).as_f64().powi(2),
+        _ => 1.0,
+    };
+    let step = |strength: f64| {
+        let step = (strength.log10() * f64::from(STEPS_PER_DECADE)).floor();
+        (step as i32).clamp(FIRST_STEP, LAST_STEP)
+    };
+    // Below `dense` only the last per cent of the smallest direction is at stake.
+    let (first, dense) = (step(smallest * f64::EPSILON), step(smallest * 1e-2));
+    grid(first)
+        .filter(|step| *step >= dense || (dense - step) % (2 * STEPS_PER_DECADE) == 0)
+        .map(strength)
+        .collect()
+}
+
+/// The largest relative error of one rounding, half of epsilon.
+fn unit_roundoff<A: Scalar>() -> f64 {
+    A::epsilon().as_f64() / 2.0
+}
+
 fn answer<A: Scalar>(
     spectrum: &Spectrum<A>,
     reason: Reason,
@@ -234,8 +293,8 @@ fn answer<A: Scalar>(
 }
 
 /// $n \cdot \text{RSS} / (n - \text{df})^2$ for each candidate and output, shape (candidates,
-/// outputs), in units of the scaled targets.
-fn gcv_scores<A: Scalar>(spectrum: &Spectrum<A>, candidates: &[f64]) -> Array2<f64> {
+/// outputs), in units of the scaled targets. RSS has in it what rounding is to add to it.
+fn gcv_scores<A: Scalar>(spectrum: &Spectrum<A>, candidates: &[f64], roundoff: f64) -> Array2<f64> {
     let mut scores = Array2::zeros((candidates.len(), spectrum.c.ncols()));
     for (mut row, &lambda) in scores.rows_mut().into_iter().zip(candidates) {
         let held_back = spectrum.ridge_held_back(A::from_f64(lambda));
@@ -246,15 +305,27 @@ fn gcv_scores<A: Scalar>(spectrum: &Spectrum<A>, candidates: &[f64]) -> Array2<f
                 .fold(spectrum.unreached[output], |sum, &c, &h| {
                     sum + (c * h).powi(2)
                 });
-            *score = rest.as_f64() / (spare * spare);
+            *score = rest.as_f64();
+        }
+        let kept = spectrum.ridge_kept(A::from_f64(lambda));
+        let rounding = spectrum.rounding_squares(&kept, roundoff, |o| NEGLIGIBLE * row[o]);
+        for (score, rounding) in row.iter_mut().zip(rounding) {
+            *score = (*score + rounding) / (spare * spare);
         }
     }
     scores
 }
 
-/// The sum of squared leave-one-out residuals for each candidate and output, shape (candidates,
-/// outputs), in units of the scaled targets.
-fn leave_one_out_scores<A: Scalar>(rows: &RowSpectrum<A>, candidates: &[f64]) -> Array2<f64> {
+/// The share of a score that rounding errors must have for them to be looked at closely.
+const NEGLIGIBLE: f64 = 1e-6;
+
+/// The sum of squared leave-one-out residuals, and of what rounding is to add to them, for each
+/// candidate and output, shape (candidates, outputs), in units of the scaled targets.
+fn leave_one_out_scores<A: Scalar>(
+    rows: &RowSpectrum<A>,
+    candidates: &[f64],
+    roundoff: f64,
+) -> Array2<f64> {
     let mut scores = Array2::zeros((candidates.len(), rows.spectrum.c.ncols()));
     let squared = rows.u.mapv(|u| u * u);
     for (mut score, &lambda) in scores.rows_mut().into_iter().zip(candidates) {
@@ -267,6 +338,12 @@ fn leave_one_out_scores<A: Scalar>(rows: &RowSpectrum<A>, candidates: &[f64]) ->
         );
         for (score, column) in score.iter_mut().zip(residuals.columns()) {
             *score = column.iter().map(|e| e.as_f64().powi(2)).sum();
+        }
+        let kept = rows.spectrum.ridge_kept(A::from_f64(lambda));
+        let negligible = |o: usize| NEGLIGIBLE * score[o];
+        let rounding = rows.spectrum.rounding_squares(&kept, roundoff, negligible);
+        for (score, rounding) in score.iter_mut().zip(rounding) {
+            *score += rounding;
         }
     }
     scores

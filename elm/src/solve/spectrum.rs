@@ -27,6 +27,8 @@ pub(crate) struct Spectrum<A: Scalar> {
     pub(crate) c: Array2<A>,
     /// For each output the sum of squares of $\tilde T$ that no singular vector reaches.
     pub(crate) unreached: Array1<A>,
+    /// The sum of squares of each column as predictions see it: scaled but not centred.
+    pub(crate) lengths: Array1<A>,
     pub(crate) frame: Frame<A>,
 }
 
@@ -58,6 +60,7 @@ impl<A: Scalar> Spectrum<A> {
             targets,
             frame,
         } = prepared;
+        let lengths = frame.lengths(hidden.view());
         // Below twice as many rows as columns QR first costs more than it saves.
         if hidden.nrows() >= 2 * hidden.ncols() {
             let Triangular { r, qtb, unreached } = A::triangularise(hidden.view(), targets.view())?;
@@ -71,6 +74,7 @@ impl<A: Scalar> Spectrum<A> {
                 vt,
                 c,
                 unreached,
+                lengths,
                 frame,
             });
         }
@@ -87,6 +91,7 @@ impl<A: Scalar> Spectrum<A> {
             vt,
             c,
             unreached: squares(residual.view()),
+            lengths,
             frame,
         })
     }
@@ -195,6 +200,37 @@ impl<A: Scalar> Spectrum<A> {
         self.s.mapv(|s| share(lambda, (s / self.s[0]).powi(2)))
     }
 
+    /// For each output the squared error that rounding leaves in the predictions of all rows, in
+    /// units of the scaled targets, when each direction keeps this share and arithmetic has this
+    /// unit roundoff $u$: $u^2 \sum_k \lVert h_k \rVert^2 \beta_k^2$, each product being off by $u$ of
+    /// itself. Where that is below `negligible` the result is 0.
+    pub(crate) fn rounding_squares(
+        &self,
+        kept: &Array1<A>,
+        roundoff: f64,
+        negligible: impl Fn(usize) -> f64,
+    ) -> Vec<f64> {
+        let gain = (kept / &self.s).insert_axis(Axis(1));
+        let along = &self.c * &gain;
+        let squared = roundoff * roundoff;
+        let longest = self.lengths.iter().fold(0.0, |m: f64, l| m.max(l.as_f64()));
+        let matters: Vec<usize> = (0..along.ncols())
+            .filter(|&output| {
+                let column = along.column(output);
+                squared * longest * column.dot(&column).as_f64() > negligible(output)
+            })
+            .collect();
+        let mut errors = vec![0.0; along.ncols()];
+        let beta = A::product(self.vt.t(), along.select(Axis(1), &matters).view());
+        for (&output, beta) in matters.iter().zip(beta.columns()) {
+            let sum = Zip::from(beta)
+                .and(&self.lengths)
+                .fold(A::zero(), |sum, &b, &length| sum + b * b * length);
+            errors[output] = squared * sum.as_f64();
+        }
+        errors
+    }
+
     /// Weighted rows that neither the singular vectors nor the intercept account for.
     pub(crate) fn spare_rows(&self) -> usize {
         let used = self.s.len() + usize::from(self.frame.intercept);
@@ -230,6 +266,7 @@ impl<A: Scalar> RowSpectrum<A> {
             targets,
             frame,
         } = Prepared::new(problem);
+        let lengths = frame.lengths(hidden.view());
         let Svd { u, s, vt } = truncate(A::svd(hidden.view())?, frame.rows);
         let c = A::product(u.t(), targets.view());
         let constant = frame.constant_direction();
@@ -243,6 +280,7 @@ impl<A: Scalar> RowSpectrum<A> {
                 vt,
                 unreached: Array1::zeros(targets.ncols()),
                 c,
+                lengths,
                 frame,
             },
             constant,
