@@ -25,6 +25,8 @@
 //!   with its strength chosen by exact leave-one-out, which is the default.
 //! - [`validate`] has held-out predictions in closed form, leave-one-out and k-fold.
 //! - [`Accumulator`] fits to rows that arrive in pieces.
+//! - [`tune`] chooses scale, neurons and inputs; [`uncertainty`] says how far a prediction can be
+//!   trusted; [`persist`] keeps a network in a file.
 //! - [`metrics`] has RMSE, MAE and correlation.
 //!
 //! Everything is generic over [`Scalar`], `f32` or `f64`. No input makes the public API panic:
@@ -48,6 +50,7 @@ mod hidden;
 mod linalg;
 pub mod metrics;
 mod model;
+mod network;
 pub mod persist;
 mod predictor;
 mod scalar;
@@ -63,7 +66,8 @@ pub use activation::{Accuracy, Activation};
 pub use error::{Error, Result};
 pub use hidden::{Biases, Distribution, HiddenLayer};
 pub use linalg::backend;
-pub use model::{CheckedParams, Elm, ElmParams, Targets};
+pub use model::{CheckedParams, ElmParams, Targets};
+pub use network::Elm;
 pub use predictor::{Predictor, Scratch};
 pub use scalar::Scalar;
 pub use scaler::Scaler;

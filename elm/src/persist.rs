@@ -34,7 +34,7 @@ use serde::{Deserialize, Serialize};
 use crate::accumulate::Accumulator;
 use crate::activation::Activation;
 use crate::hidden::HiddenLayer;
-use crate::model::Elm;
+use crate::network::Elm;
 use crate::scalar::Scalar;
 
 /// The version of the layout that this build writes, and the latest that it reads.

@@ -34,7 +34,8 @@
 use ndarray::{Array1, Array2, ArrayRef2, Axis, Zip};
 
 use crate::error::{Error, Result};
-use crate::model::{CheckedParams, Elm, ElmParams, Targets};
+use crate::model::{CheckedParams, ElmParams, Targets};
+use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::solve::Solver;
 use crate::validate::Validator;

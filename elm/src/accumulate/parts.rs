@@ -6,7 +6,7 @@ use serde::Deserialize;
 use super::{Accumulator, BLOCK, OVERFLOW};
 use crate::error::{Error, Result};
 use crate::hidden::HiddenLayer;
-use crate::model::check_layer;
+use crate::network::check_layer;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
 use crate::solve::{Solver, check_length, check_matrix};

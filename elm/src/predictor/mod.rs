@@ -13,7 +13,7 @@ use ndarray::{Array2, ArrayRef2, ArrayView2, ArrayViewMut2, Axis, aview_mut1, av
 
 use crate::activation::{Accuracy, Activation};
 use crate::error::{Error, Result};
-use crate::model::Elm;
+use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
 use crate::simd::Level;

@@ -1,0 +1,205 @@
+//! The fitted network: the random layer of equation 7 with the output weights that were found.
+
+use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+use crate::hidden::HiddenLayer;
+use crate::predictor::Predictor;
+use crate::scalar::Scalar;
+use crate::scaler::Scaler;
+use crate::solve::{Diagnosis, Solution, check_length, check_matrix};
+
+/// Project, activate, and append the inputs where they are linked directly.
+pub(crate) fn design<A: Scalar>(
+    hidden: &HiddenLayer<A>,
+    direct_links: bool,
+    x: ArrayView2<'_, A>,
+) -> Array2<A> {
+    let h = hidden.forward(x);
+    if !direct_links {
+        return h;
+    }
+    let mut both = Array2::zeros((x.nrows(), h.ncols() + x.ncols()));
+    both.slice_mut(ndarray::s![.., ..h.ncols()]).assign(&h);
+    both.slice_mut(ndarray::s![.., h.ncols()..]).assign(&x);
+    both
+}
+
+/// A fitted network: $o(x) = \sum_k \beta_k f(\omega_k \cdot x + b_k)$ (equation 7) plus, where
+/// set, an intercept and direct links. Made by [`ElmParams::fit`](crate::ElmParams::fit).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "", try_from = "Parts<A>")]
+pub struct Elm<A: Scalar> {
+    scaler: Option<Scaler<A>>,
+    hidden: HiddenLayer<A>,
+    direct_links: bool,
+    /// Shape (neurons, or neurons + inputs with direct links; outputs).
+    beta: Array2<A>,
+    intercept: Array1<A>,
+    diagnosis: Diagnosis,
+}
+
+/// An [`Elm`] as it comes from outside, before its parts are known to fit together.
+#[derive(Deserialize)]
+#[serde(bound = "")]
+struct Parts<A: Scalar> {
+    scaler: Option<Scaler<A>>,
+    hidden: HiddenLayer<A>,
+    direct_links: bool,
+    beta: Array2<A>,
+    intercept: Array1<A>,
+    diagnosis: Diagnosis,
+}
+
+/// Whether a layer and a scaler from outside are finite and fit each other.
+pub(crate) fn check_layer<A: Scalar>(
+    hidden: &HiddenLayer<A>,
+    scaler: Option<&Scaler<A>>,
+) -> Result<()> {
+    let (inputs, neurons) = hidden.weights().dim();
+    check_matrix("hidden weights", hidden.weights())?;
+    check_length("hidden biases", hidden.biases().len(), neurons)?;
+    check_matrix("hidden biases", hidden.biases().insert_axis(Axis(0)))?;
+    for vector in scaler.iter().flat_map(|s| [s.mean(), s.factor()]) {
+        check_length("inputs of the scaler", vector.len(), inputs)?;
+        check_matrix("the scaler", vector.insert_axis(Axis(0)))?;
+    }
+    Ok(())
+}
+
+impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
+    type Error = Error;
+
+    fn try_from(parts: Parts<A>) -> Result<Self> {
+        let Parts {
+            scaler,
+            hidden,
+            direct_links,
+            beta,
+            intercept,
+            diagnosis,
+        } = parts;
+        check_layer(&hidden, scaler.as_ref())?;
+        let (inputs, neurons) = hidden.weights().dim();
+        check_matrix("output weights", beta.view())?;
+        let columns = neurons + if direct_links { inputs } else { 0 };
+        check_length("rows of output weights", beta.nrows(), columns)?;
+        check_length("intercepts", intercept.len(), beta.ncols())?;
+        check_matrix("intercepts", intercept.view().insert_axis(Axis(0)))?;
+        Ok(Self {
+            scaler,
+            hidden,
+            direct_links,
+            beta,
+            intercept,
+            diagnosis,
+        })
+    }
+}
+
+impl<A: Scalar> Elm<A> {
+    pub(crate) fn assemble(
+        scaler: Option<Scaler<A>>,
+        hidden: HiddenLayer<A>,
+        direct_links: bool,
+        solution: Solution<A>,
+    ) -> Self {
+        let Solution {
+            beta,
+            intercept,
+            diagnosis,
+        } = solution;
+        Self {
+            scaler,
+            hidden,
+            direct_links,
+            beta,
+            intercept,
+            diagnosis,
+        }
+    }
+
+    /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs).
+    ///
+    /// # Errors
+    /// [`Error::Shape`] when the number of inputs differs from the training data's,
+    /// [`Error::NotFinite`] for a NaN or infinity in `x`, [`Error::Overflow`] when a prediction is
+    /// outside the range of the type. No rows is fine and gives no rows.
+    pub fn predict(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
+        self.predictor().predict(x)
+    }
+
+    /// The network packed for evaluation: for many calls, few rows at a time, threads, or
+    /// memory of the caller's own.
+    #[must_use]
+    pub fn predictor(&self) -> Predictor<A> {
+        Predictor::new(self)
+    }
+
+    /// The hidden-layer matrix of these inputs (the paper's $F$, equation 9): shape (rows, inputs)
+    /// to (rows, neurons), followed by the standardised inputs where they are linked directly.
+    /// Times [`beta`](Self::beta) plus [`intercept`](Self::intercept) it is the prediction.
+    ///
+    /// # Errors
+    /// [`Error::Shape`], [`Error::Empty`] and [`Error::NotFinite`] for `x`.
+    pub fn hidden_matrix(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
+        check_length("inputs", x.ncols(), self.inputs())?;
+        check_matrix("inputs", x.view())?;
+        let scaled = self
+            .scaler
+            .as_ref()
+            .map(|scaler| scaler.transform(x.view()));
+        let x = scaled.as_ref().map_or(x.view(), |scaled| scaled.view());
+        Ok(design(&self.hidden, self.direct_links, x))
+    }
+
+    /// Number of inputs.
+    #[must_use]
+    pub fn inputs(&self) -> usize {
+        self.hidden.inputs()
+    }
+
+    /// Number of outputs.
+    #[must_use]
+    pub fn outputs(&self) -> usize {
+        self.beta.ncols()
+    }
+
+    /// The random hidden layer.
+    #[must_use]
+    pub fn hidden(&self) -> &HiddenLayer<A> {
+        &self.hidden
+    }
+
+    /// The standardisation of inputs, where it is on.
+    #[must_use]
+    pub fn scaler(&self) -> Option<&Scaler<A>> {
+        self.scaler.as_ref()
+    }
+
+    /// The output weights $\beta$, shape (neurons, outputs); with direct links the inputs' rows
+    /// follow the neurons'.
+    #[must_use]
+    pub fn beta(&self) -> ArrayView2<'_, A> {
+        self.beta.view()
+    }
+
+    /// The constant added to each output.
+    #[must_use]
+    pub fn intercept(&self) -> ArrayView1<'_, A> {
+        self.intercept.view()
+    }
+
+    /// Other output weights, for tests that compare networks in two precisions.
+    #[cfg(test)]
+    pub(crate) fn set_readout(&mut self, beta: Array2<A>, intercept: Array1<A>) {
+        (self.beta, self.intercept) = (beta, intercept);
+    }
+
+    /// What the solver reported.
+    #[must_use]
+    pub fn diagnosis(&self) -> &Diagnosis {
+        &self.diagnosis
+    }
+}
