@@ -3,28 +3,26 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::time::{Duration, Instant};
-
 use elm::solve::{Inverse, LeastSquares, PseudoInverse, Ridge, Solver};
 use elm::{ElmParams, Error};
 use elm_benches::stress::cases::{CASES, Case};
 use elm_benches::stress::{Method, Precision, Settings, run};
 use ndarray::Array2;
 
-/// The cases whose targets have noise. Of those without, rounding decides how close a fit comes to
-/// the oracle; `docs/stability.md` has their figures.
-fn noisy() -> Vec<Case> {
-    let noisy = |case: &&Case| !case.name.starts_with("no noise");
+/// The cases whose noise is above a hundred roundings of the type. Below that it is rounding that
+/// decides how close a fit comes to the oracle; `docs/stability.md` has those figures too.
+fn noisy(epsilon: f64) -> Vec<Case> {
+    let noisy = |case: &&Case| case.problem(1).noise > 100.0 * epsilon;
     CASES.iter().filter(noisy).copied().collect()
 }
 
-fn default_fit_is_within(bar: f64, precision: Precision) {
+fn default_fit_is_within(bar: f64, precision: Precision, epsilon: f64) {
     let settings = Settings {
         seeds: 5,
         methods: vec![Method::Auto],
         reference: false,
     };
-    let records = run(&noisy(), precision, &settings);
+    let records = run(&noisy(epsilon), precision, &settings);
     assert!(records.len() >= 30);
     let misses: Vec<String> = records
         .iter()
@@ -36,12 +34,12 @@ fn default_fit_is_within(bar: f64, precision: Precision) {
 
 #[test]
 fn the_default_fit_is_within_a_fifth_of_the_best_on_every_case_in_double_precision() {
-    default_fit_is_within(1.2, Precision::F64);
+    default_fit_is_within(1.2, Precision::F64, f64::EPSILON);
 }
 
 #[test]
 fn the_default_fit_is_within_a_half_of_the_best_on_every_case_in_single_precision() {
-    default_fit_is_within(1.5, Precision::F32);
+    default_fit_is_within(1.5, Precision::F32, f32::EPSILON.into());
 }
 
 #[test]
@@ -73,7 +71,7 @@ fn the_default_fit_is_that_of_the_reference_to_the_digits_that_the_regularised_c
 }
 
 #[test]
-fn a_nan_is_refused_at_once_by_every_solver() {
+fn a_nan_is_refused_before_any_factorisation() {
     // An SVD without a cap on its iterations would never return.
     let mut h = Array2::from_shape_fn((300, 300), |(i, j)| ((i * 300 + j) as f64).sin());
     let t = h.column(0).to_owned().insert_axis(ndarray::Axis(1));
@@ -83,7 +81,6 @@ fn a_nan_is_refused_at_once_by_every_solver() {
         row: 299,
         column: 7,
     };
-    let start = Instant::now();
     assert_eq!(
         LeastSquares::new(&h, &t).map(|_| ()),
         Err(expected("hidden-layer matrix"))
@@ -97,5 +94,4 @@ fn a_nan_is_refused_at_once_by_every_solver() {
         let params = ElmParams::new(300).solver(solver);
         assert_eq!(params.fit(&h, &t).map(|_| ()), Err(expected("inputs")));
     }
-    assert!(start.elapsed() < Duration::from_secs(2));
 }

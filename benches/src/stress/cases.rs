@@ -55,6 +55,8 @@ pub struct Problem {
     pub test: Array2<f64>,
     /// Shape (test rows, outputs), with noise.
     pub test_targets: Array2<f64>,
+    /// Standard deviation of the noise relative to the signal's.
+    pub noise: f64,
     /// What the targets are multiplied by once they have the type that is tested.
     pub magnitude: Magnitude,
 }
@@ -212,7 +214,10 @@ impl Draw {
         let x = self.uniform(rows + TEST_ROWS, 1);
         let signal = x.mapv(|x| (3.0 * frequency * x).sin() / (1.0 + x * x));
         let targets = self.noisy(&signal, noise);
-        split(network(neurons), &x, &targets, rows)
+        Problem {
+            noise,
+            ..split(network(neurons), &x, &targets, rows)
+        }
     }
 
     /// Thirty different smooth functions, the later ones with more noise.
@@ -286,6 +291,7 @@ fn split(level: Level, rows: &Array2<f64>, targets: &Array2<f64>, train: usize) 
         targets: targets.to_owned(),
         test: last.to_owned(),
         test_targets: test_targets.to_owned(),
+        noise: NOISE,
         magnitude: Magnitude::One,
     }
 }
