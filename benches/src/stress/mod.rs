@@ -11,7 +11,7 @@
 //! - the *ratio to the oracle* ([`oracle`]): the test RMSE over the smallest one that any strength
 //!   of ridge regression, or the pseudo-inverse, has on the same hidden-layer matrix, found with
 //!   the test rows in sight and computed in `f64`;
-//! - the *error* ([`reference`]): how far the predictions are from those of the same problem with
+//! - the *error* ([`mod@reference`]): how far the predictions are from those of the same problem with
 //!   the same strength, solved in double-double arithmetic (about 31 digits).
 
 pub mod cases;
