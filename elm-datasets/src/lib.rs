@@ -4,6 +4,7 @@
 //!   database itself is not part of the crate.
 //! - [`synthetic`] makes a set of the same shape from formulas, the [`analytic`] models. Both give
 //!   [`Measurements`], so that whatever works on one works on the other.
+//! - [`paint`] is a single synthetic material, as glossy as materials get.
 //! - [`open()`] reads [`Samples`] of one material from a file of any format: one's own as CSV
 //!   ([`scattered`]), the [`merl`] and [`rgl`] databases, and [`pbrt`]-v2.
 //! - [`csv`] reads tables of one's own; [`toy`] makes regression problems with known answers.
@@ -42,6 +43,7 @@ mod file;
 pub mod measurements;
 pub mod merl;
 mod open;
+pub mod paint;
 pub mod pbrt;
 pub mod rgl;
 pub mod samples;
