@@ -1,16 +1,16 @@
 //! k-fold cross-validation of anything that can be fitted to measurements.
 
-use elm::metrics;
-use elm_datasets::{Directions, Material, MaterialId, Measurements};
-use ndarray::{Array1, Array2, Axis, concatenate};
+use elm_datasets::{Directions, Material, MaterialId, Measurements, Samples};
+use ndarray::{Array1, Array2, ArrayView2, Axis, Slice, concatenate};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
-use serde::{Deserialize, Serialize};
 
 use crate::brdf::Fit;
 use crate::error::{Error, Result};
-use crate::geometry::Pair;
+use crate::geometry::{self, Pair};
+use crate::metrics::Metrics;
+use crate::quality::{self, NoiseFloor};
 
 /// Which fold each measurement is held out in: a seeded shuffle, dealt into folds whose sizes
 /// differ by at most one.
@@ -41,6 +41,16 @@ impl Folds {
         Ok(Self { count, of_row })
     }
 
+    fn check(&self, rows: usize) -> Result<()> {
+        if self.of_row.len() == rows {
+            return Ok(());
+        }
+        Err(Error::Folds {
+            folds: self.count,
+            rows,
+        })
+    }
+
     /// Number of folds.
     #[must_use]
     pub fn count(&self) -> usize {
@@ -54,42 +64,8 @@ impl Folds {
     }
 }
 
-/// Measures of error of a set of predictions.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Metrics {
-    /// Root mean squared error in 1/sr.
-    pub rmse: f64,
-    /// Mean absolute error in 1/sr.
-    pub mae: f64,
-    /// Pearson's correlation coefficient; `None` where it does not exist.
-    pub correlation: Option<f64>,
-}
-
-impl Metrics {
-    fn of(predicted: &Array1<f64>, truth: &Array1<f64>) -> Result<Self> {
-        Ok(Self {
-            rmse: metrics::rmse(predicted, truth)?,
-            mae: metrics::mae(predicted, truth)?,
-            correlation: metrics::correlation(predicted, truth)?,
-        })
-    }
-
-    /// The mean of each measure over those folds that have it.
-    fn mean(folds: &[Self]) -> Self {
-        let mean = |values: Vec<f64>| {
-            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-        };
-        let (rmse, mae) = folds.iter().map(|fold| (fold.rmse, fold.mae)).unzip();
-        Self {
-            rmse: mean(rmse).unwrap_or(0.0),
-            mae: mean(mae).unwrap_or(0.0),
-            correlation: mean(folds.iter().filter_map(|fold| fold.correlation).collect()),
-        }
-    }
-}
-
 /// What cross-validation found for one channel of one material.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Scores {
     /// Over the training rows of all folds together: each measurement counts once for every fold
     /// that trained on it.
@@ -98,17 +74,26 @@ pub struct Scores {
     pub held_out: Metrics,
     /// The mean over folds of each fold's held-out measures.
     pub held_out_fold_mean: Metrics,
+    /// As [`held_out`](Self::held_out), but for the measurements that look
+    /// [saturated](quality::saturated); they were trained on all the same.
+    pub held_out_unsaturated: Metrics,
+    /// The measurements that look saturated: rows of the material's values.
+    pub saturated: Vec<usize>,
+    /// What reciprocal pairs show of the measurements' noise.
+    pub noise_floor: Option<NoiseFloor>,
 }
 
 /// The scores of one material.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MaterialScores {
-    /// The material.
-    pub id: MaterialId,
+    /// The material's number; `None` for samples of one's own.
+    pub id: Option<MaterialId>,
     /// Its name.
     pub name: String,
     /// One entry per channel of the measurements.
     pub channels: Vec<Scores>,
+    /// The held-out prediction of each value, in 1/sr, of the shape of the material's values.
+    pub predicted: Array2<f64>,
 }
 
 /// Cross-validates `method` on every material, and calls `done` after each fit with the number of
@@ -127,31 +112,60 @@ pub fn cross_validate(
     folds: &Folds,
     mut done: impl FnMut(usize, usize),
 ) -> Result<Vec<MaterialScores>> {
-    if folds.of_row.len() != data.directions.len() {
-        return Err(Error::Folds {
-            folds: folds.count,
-            rows: data.directions.len(),
-        });
-    }
+    folds.check(data.directions.len())?;
     let groups = groups(&data.materials);
     let fits = groups.len() * folds.count;
     let mut scores: Vec<Option<MaterialScores>> = vec![None; data.materials.len()];
     for (g, members) in groups.iter().enumerate() {
         let materials: Vec<&Material> = members.iter().map(|&m| &data.materials[m]).collect();
         let group = Group::new(&materials, &data.directions)?;
-        let columns =
+        let (predicted, columns) =
             group.cross_validate(method, folds, |fold| done(g * folds.count + fold, fits))?;
         let mut columns = columns.into_iter();
+        let mut first = 0;
         for (&member, material) in members.iter().zip(&materials) {
-            let channels = columns.by_ref().take(material.values.ncols()).collect();
+            let next = first + material.values.ncols();
             scores[member] = Some(MaterialScores {
-                id: material.id,
+                id: Some(material.id),
                 name: material.name.clone(),
-                channels,
+                channels: columns.by_ref().take(next - first).collect(),
+                predicted: predicted
+                    .slice_axis(Axis(1), Slice::from(first..next))
+                    .to_owned(),
             });
+            first = next;
         }
     }
     Ok(scores.into_iter().flatten().collect())
+}
+
+/// Cross-validates `method` on samples of a single material, and calls `done` as
+/// [`cross_validate`] does.
+///
+/// # Errors
+/// As for [`cross_validate`].
+pub fn cross_validate_samples(
+    method: &dyn Fit,
+    name: &str,
+    samples: &Samples,
+    folds: &Folds,
+    mut done: impl FnMut(usize, usize),
+) -> Result<MaterialScores> {
+    folds.check(samples.directions.len())?;
+    let rows: Vec<usize> = (0..samples.directions.len()).collect();
+    let group = Group {
+        rows: &rows,
+        pairs: geometry::pairs(&samples.directions),
+        values: samples.values.clone(),
+    };
+    let (predicted, channels) =
+        group.cross_validate(method, folds, |fold| done(fold, folds.count))?;
+    Ok(MaterialScores {
+        id: None,
+        name: name.to_owned(),
+        channels,
+        predicted,
+    })
 }
 
 /// Indices of the materials that were measured at the same directions, in order of appearance.
@@ -200,74 +214,102 @@ impl<'a> Group<'a> {
         })
     }
 
-    /// Scores of each column.
+    /// The held-out prediction of each value, and the scores of each column.
     fn cross_validate(
         &self,
         method: &dyn Fit,
         folds: &Folds,
         mut done: impl FnMut(usize),
-    ) -> Result<Vec<Scores>> {
-        let mut train = Predictions::default();
-        let mut held_out = Predictions::default();
-        let mut fold_metrics: Vec<Vec<Metrics>> = vec![Vec::new(); self.values.ncols()];
+    ) -> Result<(Array2<f64>, Vec<Scores>)> {
+        let columns = self.values.ncols();
+        let mut train = Training::default();
+        let mut held_out = Array2::zeros(self.values.dim());
+        let mut fold_metrics: Vec<Vec<Metrics>> = vec![Vec::new(); columns];
         for fold in 0..folds.count {
             let (test_rows, train_rows): (Vec<usize>, Vec<usize>) =
                 (0..self.rows.len()).partition(|&r| folds.of_row(self.rows[r]) == fold);
-            let select = |rows: &[usize]| -> (Vec<Pair>, Array2<f64>) {
-                let pairs = rows.iter().map(|&row| self.pairs[row]).collect();
-                (pairs, self.values.select(Axis(0), rows))
-            };
-            let (train_pairs, train_values) = select(&train_rows);
+            let (train_pairs, train_values) = self.select(&train_rows);
             let model = method.fit(&train_pairs, train_values.view())?;
-            train.push(model.eval(&train_pairs)?, train_values);
+            train.push(&train_pairs, model.eval(&train_pairs)?, train_values);
             // Where invalid values are dropped a fold may hold none of a material's rows.
             if !test_rows.is_empty() {
-                let (test_pairs, truth) = select(&test_rows);
+                let (test_pairs, truth) = self.select(&test_rows);
                 let predicted = model.eval(&test_pairs)?;
                 for (column, metrics) in fold_metrics.iter_mut().enumerate() {
-                    let (p, t) = (predicted.column(column), truth.column(column));
-                    metrics.push(Metrics::of(&p.to_owned(), &t.to_owned())?);
+                    let (predicted, truth) = (one(&predicted, column), one(&truth, column));
+                    metrics.push(Metrics::of(&test_pairs, predicted, truth)?);
                 }
-                held_out.push(predicted, truth);
+                for (predicted, &row) in predicted.rows().into_iter().zip(&test_rows) {
+                    held_out.row_mut(row).assign(&predicted);
+                }
             }
             done(fold + 1);
         }
-        let (train, held_out) = (train.metrics()?, held_out.metrics()?);
-        let columns = train.into_iter().zip(held_out).zip(fold_metrics);
-        Ok(columns
-            .map(|((train, held_out), folds)| Scores {
-                train,
-                held_out,
-                held_out_fold_mean: Metrics::mean(&folds),
+        let exchanged = quality::exchanged(&self.pairs);
+        let scores = (0..columns).map(|column| {
+            let values = self.values.column(column);
+            let saturated = quality::saturated(&self.pairs, values);
+            let all = Metrics::of(
+                &self.pairs,
+                one(&held_out, column),
+                one(&self.values, column),
+            )?;
+            Ok(Scores {
+                train: train.metrics(column)?,
+                held_out: all,
+                held_out_fold_mean: Metrics::mean(&fold_metrics[column]).unwrap_or(all),
+                held_out_unsaturated: self.without(&saturated, &held_out, column)?,
+                noise_floor: NoiseFloor::of(&exchanged, values),
+                saturated,
             })
-            .collect())
+        });
+        let scores = scores.collect::<Result<_>>()?;
+        Ok((held_out, scores))
+    }
+
+    fn select(&self, rows: &[usize]) -> (Vec<Pair>, Array2<f64>) {
+        let pairs = rows.iter().map(|&row| self.pairs[row]).collect();
+        (pairs, self.values.select(Axis(0), rows))
+    }
+
+    /// The metrics of a column over all rows but these, which never are all.
+    fn without(&self, rows: &[usize], predicted: &Array2<f64>, column: usize) -> Result<Metrics> {
+        let left: Vec<usize> = (0..self.rows.len())
+            .filter(|row| rows.binary_search(row).is_err())
+            .collect();
+        let (pairs, truth) = self.select(&left);
+        let predicted = predicted.select(Axis(0), &left);
+        Metrics::of(&pairs, one(&predicted, column), one(&truth, column))
     }
 }
 
-/// Predictions and truths of several folds.
+/// One column, still of two dimensions.
+fn one(values: &Array2<f64>, column: usize) -> ArrayView2<'_, f64> {
+    values.slice_axis(Axis(1), Slice::from(column..=column))
+}
+
+/// Predictions of the rows that each fold trained on, and the truth.
 #[derive(Default)]
-struct Predictions {
+struct Training {
+    pairs: Vec<Pair>,
     predicted: Vec<Array2<f64>>,
     truth: Vec<Array2<f64>>,
 }
 
-impl Predictions {
-    fn push(&mut self, predicted: Array2<f64>, truth: Array2<f64>) {
+impl Training {
+    fn push(&mut self, pairs: &[Pair], predicted: Array2<f64>, truth: Array2<f64>) {
+        self.pairs.extend_from_slice(pairs);
         self.predicted.push(predicted);
         self.truth.push(truth);
     }
 
-    /// The metrics of each column over all folds.
-    fn metrics(&self) -> Result<Vec<Metrics>> {
-        let columns = self.truth.first().map_or(0, Array2::ncols);
-        let column = |parts: &[Array2<f64>], c: usize| -> Array1<f64> {
-            parts
-                .iter()
-                .flat_map(|part| part.column(c).to_vec())
-                .collect()
+    /// The metrics of a column over all folds.
+    fn metrics(&self, column: usize) -> Result<Metrics> {
+        let join = |parts: &[Array2<f64>]| {
+            let values = parts.iter().flat_map(|part| part.column(column).to_vec());
+            values.collect::<Array1<f64>>().insert_axis(Axis(1))
         };
-        (0..columns)
-            .map(|c| Metrics::of(&column(&self.predicted, c), &column(&self.truth, c)))
-            .collect()
+        let (predicted, truth) = (join(&self.predicted), join(&self.truth));
+        Metrics::of(&self.pairs, predicted.view(), truth.view())
     }
 }

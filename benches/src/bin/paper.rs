@@ -120,7 +120,7 @@ fn pairs<'a>(
             .iter()
             .zip(&data.channels)
             .filter_map(move |(scores, channel)| {
-                Some((scores, published::figures(material.id, channel)?))
+                Some((scores, published::figures(material.id?, channel)?))
             })
     })
 }

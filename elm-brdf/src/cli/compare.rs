@@ -113,6 +113,7 @@ fn networks(seed: u64) -> [Reference; 2] {
         name: name.to_owned(),
         features: Some(params.features),
         link: Some(params.link),
+        growth: reference::Growth::Linear,
         method: Box::new(params),
     };
     [

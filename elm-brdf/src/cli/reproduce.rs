@@ -108,6 +108,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         solver: arguments.solver.name().to_owned(),
         folds: arguments.folds,
         seed: arguments.seed,
+        seeds: 1,
     };
     hint(&source);
     let progress = progress("fold");
@@ -124,7 +125,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         fit: total - load,
         total,
     };
-    let report = Report::new(source.describe(), &data, protocol, scores, seconds);
+    let report = Report::new(source.describe(), &data, protocol, &[scores], seconds);
     if let Some(dir) = &arguments.out {
         report.write(dir)?;
     }

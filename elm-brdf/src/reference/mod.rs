@@ -56,8 +56,36 @@ pub struct Reference {
     pub features: Option<Features>,
     /// Its target, where it has a choice.
     pub link: Option<Link>,
+    /// How its cost grows with the measurements.
+    pub growth: Growth,
     /// The method.
     pub method: Box<dyn Fit>,
+}
+
+/// How the cost of a fit grows with the number of measurements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Growth {
+    /// In proportion, with little memory.
+    Linear,
+    /// In proportion, but with a grid of starts that keeps its terms for every measurement.
+    Grid,
+    /// With their cube, and memory with their square: one decomposition.
+    Cubic,
+    /// The same, once for each of many candidates.
+    ManyCubic,
+}
+
+impl Growth {
+    /// The most measurements that a comparison affords; `None` for no limit.
+    #[must_use]
+    pub fn most_rows(self) -> Option<usize> {
+        match self {
+            Self::Linear => None,
+            Self::Grid => Some(2000),
+            Self::Cubic => Some(1000),
+            Self::ManyCubic => Some(400),
+        }
+    }
 }
 
 /// Every reference: the analytic models, Koenderink's basis, and the interpolators on the paper's
@@ -76,6 +104,7 @@ fn with_candidates(candidates: usize) -> Vec<Reference> {
             name: model.name().to_owned(),
             features: None,
             link: None,
+            growth: Growth::Grid,
             method: Box::new(model),
         })
         .collect();
@@ -83,6 +112,7 @@ fn with_candidates(candidates: usize) -> Vec<Reference> {
         name: format!("koenderink-{order}"),
         features: None,
         link: None,
+        growth: Growth::Linear,
         // Order 8 overfits without: 55 coefficients, some 185 measurements.
         method: Box::new(Koenderink {
             order,
@@ -116,22 +146,23 @@ fn interpolators(features: Features, link: Link, candidates: usize) -> Vec<Refer
             smoothing,
         })
     };
+    use Growth::{Cubic, Linear, ManyCubic};
+    use Smoothing::{Exact, LeaveOneOut};
     let methods = [
-        ("nearest", neighbours(1)),
-        ("inverse-distance-5", neighbours(5)),
-        ("inverse-distance-all", neighbours(usize::MAX)),
-        ("thin-plate", radial(Radial::ThinPlate, Smoothing::Exact)),
+        ("nearest", Linear, neighbours(1)),
+        ("inverse-distance-5", Linear, neighbours(5)),
+        ("inverse-distance-all", Linear, neighbours(usize::MAX)),
+        ("thin-plate", Cubic, radial(Radial::ThinPlate, Exact)),
         (
             "thin-plate-smoothed",
-            radial(Radial::ThinPlate, Smoothing::LeaveOneOut),
+            Cubic,
+            radial(Radial::ThinPlate, LeaveOneOut),
         ),
-        ("cubic", radial(Radial::Cubic, Smoothing::Exact)),
-        (
-            "cubic-smoothed",
-            radial(Radial::Cubic, Smoothing::LeaveOneOut),
-        ),
+        ("cubic", Cubic, radial(Radial::Cubic, Exact)),
+        ("cubic-smoothed", Cubic, radial(Radial::Cubic, LeaveOneOut)),
         (
             "gaussian-process",
+            ManyCubic,
             Box::new(GaussianProcess {
                 candidates,
                 ..GaussianProcess::new(features, link)
@@ -140,10 +171,11 @@ fn interpolators(features: Features, link: Link, candidates: usize) -> Vec<Refer
     ];
     methods
         .into_iter()
-        .map(|(name, method)| Reference {
+        .map(|(name, growth, method)| Reference {
             name: name.to_owned(),
             features: Some(features),
             link: Some(link),
+            growth,
             method,
         })
         .collect()

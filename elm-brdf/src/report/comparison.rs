@@ -6,7 +6,7 @@ use comfy_table::CellAlignment;
 use elm_datasets::Measurements;
 
 use super::tables::{Style, push, styled, trim};
-use super::{Data, Format, json, paper};
+use super::{Data, Format, json, mean, paper};
 use crate::error::{Error, Result};
 use crate::protocol::MaterialScores;
 
@@ -61,12 +61,12 @@ impl Entry {
         data: &Measurements,
         scores: &[MaterialScores],
     ) -> Self {
-        let synthetic = data.origin != elm_datasets::Origin::Curet;
+        let measured = data.origin == elm_datasets::Origin::Curet;
         let channels = || scores.iter().flat_map(|material| &material.channels);
         let ratios = scores.iter().flat_map(|material| {
             let channels = material.channels.iter().zip(&data.channels);
             channels.filter_map(|(scores, channel)| {
-                let paper = paper(material.id, channel, synthetic)?;
+                let paper = paper(material.id?, channel, measured)?;
                 Some((scores.held_out.rmse / paper.rmse).ln())
             })
         });
@@ -85,15 +85,6 @@ impl Entry {
     }
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (mut sum, mut count) = (0.0, 0_usize);
-    for value in values {
-        sum += value;
-        count += 1;
-    }
-    (count > 0).then(|| sum / count as f64)
-}
-
 impl Comparison {
     /// Sorts the entries.
     #[must_use]
@@ -107,7 +98,7 @@ impl Comparison {
     ) -> Self {
         models.sort_by(|a, b| a.rmse.total_cmp(&b.rmse));
         Self {
-            data: Data::of(source, data),
+            data: Data::of(source, data, &[]),
             folds,
             seed,
             models,

@@ -19,6 +19,10 @@ pub(super) fn render(report: &Report) -> Result<String> {
         "train",
         "held_out",
         "held_out_fold_mean",
+        "held_out_unsaturated",
+        "held_out_deviation",
+        "noise_floor",
+        "saturated",
         "paper",
         "ratio",
     ];
@@ -43,6 +47,10 @@ pub(super) fn render(report: &Report) -> Result<String> {
                     number(measure.of(&channel.train)),
                     number(measure.of(&channel.held_out)),
                     number(measure.of(&channel.held_out_fold_mean)),
+                    number(measure.of(&channel.held_out_unsaturated)),
+                    number(channel.held_out_deviation.and_then(|d| measure.of(&d))),
+                    number(channel.noise_floor.map(|floor| floor.sigma)),
+                    channel.saturated.to_string(),
                     number(channel.paper.and_then(|paper| measure.printed(&paper))),
                     number(measure.ratio(channel)),
                 ];

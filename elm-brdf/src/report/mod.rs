@@ -13,8 +13,11 @@ use elm_datasets::{MaterialId, Measurements, Origin};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::protocol::{MaterialScores, Metrics};
+use crate::metrics::Metrics;
+use crate::protocol::{MaterialScores, Scores};
 use crate::published;
+use crate::quality::NoiseFloor;
+use tables::Measure;
 
 pub use comparison::{Comparison, Entry};
 
@@ -48,6 +51,13 @@ pub struct Data {
     pub measurements: usize,
     /// Negative values met in these materials.
     pub invalid: usize,
+    /// How many values there are.
+    pub values: usize,
+    /// How many of them look saturated.
+    pub saturated: usize,
+    /// The median over materials and channels of the noise floor that reciprocal pairs show, in
+    /// 1/sr; `None` without such pairs.
+    pub noise_floor: Option<f64>,
 }
 
 /// The settings of a cross-validation.
@@ -67,8 +77,10 @@ pub struct Protocol {
     pub solver: String,
     /// Number of folds.
     pub folds: usize,
-    /// Seed of the random layer and of the folds.
+    /// Seed of the random layer and of the folds; the first where there are several.
     pub seed: u64,
+    /// Number of seeds: this one and those that follow it. Figures are means over them.
+    pub seeds: usize,
 }
 
 /// The figures of one material.
@@ -93,6 +105,14 @@ pub struct Channel {
     pub held_out: Metrics,
     /// On the rows held out, mean over folds.
     pub held_out_fold_mean: Metrics,
+    /// On the rows held out, but for those that look saturated.
+    pub held_out_unsaturated: Metrics,
+    /// The standard deviation of `held_out` over the seeds; `None` for a single one.
+    pub held_out_deviation: Option<Metrics>,
+    /// How many values look saturated.
+    pub saturated: usize,
+    /// What reciprocal pairs show of the noise; `None` without such pairs.
+    pub noise_floor: Option<NoiseFloor>,
     /// What the paper printed; `None` for other materials and for the stand-in.
     pub paper: Option<Paper>,
 }
@@ -112,7 +132,7 @@ pub struct Paper {
 }
 
 /// All materials together.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     /// Geometric mean over the paper's materials and the channels present of held-out RMSE over
     /// printed RMSE.
@@ -120,6 +140,37 @@ pub struct Summary {
     /// Mean held-out RMSE over all materials and channels, in 1/sr.
     pub mean_held_out_rmse: f64,
     /// The largest ratio of held-out RMSE to printed RMSE.
+    pub worst_ratio_to_paper: Option<f64>,
+    /// Mean held-out RMSE without the measurements that look saturated, in 1/sr.
+    pub mean_held_out_rmse_unsaturated: f64,
+    /// How many materials and channels are better than printed; `None` where nothing is printed.
+    pub better_than_paper: Option<Better>,
+    /// The same three figures of each seed by itself; one entry for a single seed.
+    pub seeds: Vec<OfSeed>,
+}
+
+/// How many materials and channels are held out better than the paper printed them, of those that
+/// have a possible figure in print.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Better {
+    /// By root mean squared error: better, and compared.
+    pub rmse: (usize, usize),
+    /// By mean absolute error.
+    pub mae: (usize, usize),
+    /// By correlation.
+    pub correlation: (usize, usize),
+}
+
+/// The summary of one seed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct OfSeed {
+    /// The seed.
+    pub seed: u64,
+    /// As in [`Summary`].
+    pub rmse_ratio_to_paper: Option<f64>,
+    /// As in [`Summary`].
+    pub mean_held_out_rmse: f64,
+    /// As in [`Summary`].
     pub worst_ratio_to_paper: Option<f64>,
 }
 
@@ -135,39 +186,43 @@ pub struct Seconds {
 }
 
 impl Report {
-    /// Puts the scores of a cross-validation beside what the paper printed.
+    /// Puts the scores of cross-validations, one for each seed from the protocol's on, beside what
+    /// the paper printed.
     #[must_use]
     pub fn new(
         source: String,
         data: &Measurements,
         protocol: Protocol,
-        scores: Vec<MaterialScores>,
+        runs: &[Vec<MaterialScores>],
         seconds: Seconds,
     ) -> Self {
-        let synthetic = data.origin != Origin::Curet;
-        let materials: Vec<Material> = scores
-            .into_iter()
-            .map(|material| Material {
+        let measured = data.origin == Origin::Curet;
+        let materials: Vec<Material> = data
+            .materials
+            .iter()
+            .enumerate()
+            .map(|(m, material)| Material {
                 id: material.id.number(),
-                channels: material
+                name: material.name.clone(),
+                channels: data
                     .channels
                     .iter()
-                    .zip(&data.channels)
-                    .map(|(scores, channel)| Channel {
-                        channel: channel.clone(),
-                        train: scores.train,
-                        held_out: scores.held_out,
-                        held_out_fold_mean: scores.held_out_fold_mean,
-                        paper: paper(material.id, channel, synthetic),
+                    .enumerate()
+                    .filter_map(|(c, channel)| {
+                        let of_seeds: Vec<&Scores> = runs
+                            .iter()
+                            .filter_map(|run| run.get(m)?.channels.get(c))
+                            .collect();
+                        Channel::new(channel, &of_seeds, paper(material.id, channel, measured))
                     })
                     .collect(),
-                name: material.name,
             })
             .collect();
+        let scores = runs.first().map_or(&[][..], Vec::as_slice);
         Self {
-            data: Data::of(source, data),
+            data: Data::of(source, data, scores),
+            summary: Summary::of(&materials, protocol.seed, runs),
             protocol,
-            summary: Summary::of(&materials),
             materials,
             seconds,
         }
@@ -210,17 +265,65 @@ impl Report {
     }
 }
 
+impl Channel {
+    /// Means over seeds; `None` without any.
+    fn new(channel: &str, of_seeds: &[&Scores], paper: Option<Paper>) -> Option<Self> {
+        let all = |metrics: fn(&Scores) -> Metrics| -> Vec<Metrics> {
+            of_seeds.iter().map(|scores| metrics(scores)).collect()
+        };
+        let held_out = all(|scores| scores.held_out);
+        let first = of_seeds.first()?;
+        Some(Self {
+            channel: channel.to_owned(),
+            train: Metrics::mean(&all(|scores| scores.train))?,
+            held_out: Metrics::mean(&held_out)?,
+            held_out_fold_mean: Metrics::mean(&all(|scores| scores.held_out_fold_mean))?,
+            held_out_unsaturated: Metrics::mean(&all(|scores| scores.held_out_unsaturated))?,
+            held_out_deviation: Metrics::deviation(&held_out),
+            saturated: first.saturated.len(),
+            noise_floor: first.noise_floor,
+            paper,
+        })
+    }
+}
+
 impl Data {
-    fn of(source: String, data: &Measurements) -> Self {
+    fn of(source: String, data: &Measurements, scores: &[MaterialScores]) -> Self {
+        let channels = || scores.iter().flat_map(|material| &material.channels);
+        let floors = channels().filter_map(|channel| channel.noise_floor);
         Self {
             source,
-            synthetic: data.origin != Origin::Curet,
+            synthetic: matches!(data.origin, Origin::Synthetic { .. }),
             channels: data.channels.clone(),
             materials: data.materials.len(),
             measurements: data.directions.len(),
             invalid: data.invalid,
+            values: data.materials.iter().map(|m| m.values.len()).sum(),
+            saturated: channels().map(|channel| channel.saturated.len()).sum(),
+            noise_floor: median(floors.map(|floor| floor.sigma).collect()),
         }
     }
+}
+
+/// The middle value, or the mean of the two in the middle.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    let upper = *values.get(middle)?;
+    Some(if values.len() % 2 == 1 {
+        upper
+    } else {
+        f64::midpoint(values[middle - 1], upper)
+    })
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for value in values {
+        sum += value;
+        count += 1;
+    }
+    (count > 0).then(|| sum / count as f64)
 }
 
 fn json(report: &impl Serialize) -> Result<String> {
@@ -248,8 +351,8 @@ fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     Ok(())
 }
 
-fn paper(id: MaterialId, channel: &str, synthetic: bool) -> Option<Paper> {
-    if synthetic {
+fn paper(id: MaterialId, channel: &str, measured: bool) -> Option<Paper> {
+    if !measured {
         return None;
     }
     published::figures(id, channel).map(|figures| Paper {
@@ -260,22 +363,62 @@ fn paper(id: MaterialId, channel: &str, synthetic: bool) -> Option<Paper> {
     })
 }
 
+/// Of held-out RMSE over printed RMSE: the geometric mean, and the largest.
+fn ratios(pairs: impl Iterator<Item = (f64, Option<Paper>)>) -> (Option<f64>, Option<f64>) {
+    let ratios: Vec<f64> = pairs
+        .filter_map(|(rmse, paper)| Some(rmse / paper?.rmse))
+        .collect();
+    let logarithm = mean(ratios.iter().map(|ratio| ratio.ln()));
+    (logarithm.map(f64::exp), ratios.into_iter().reduce(f64::max))
+}
+
 impl Summary {
-    fn of(materials: &[Material]) -> Self {
+    fn of(materials: &[Material], seed: u64, runs: &[Vec<MaterialScores>]) -> Self {
         let channels = || materials.iter().flat_map(|material| &material.channels);
-        let ratios: Vec<f64> = channels()
-            .filter_map(|channel| Some(channel.held_out.rmse / channel.paper?.rmse))
-            .collect();
-        let mean = |values: &mut dyn Iterator<Item = f64>| {
-            let values: Vec<f64> = values.collect();
-            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+        let (rmse_ratio_to_paper, worst_ratio_to_paper) =
+            ratios(channels().map(|channel| (channel.held_out.rmse, channel.paper)));
+        let of_seed = |(run, seed): (&Vec<MaterialScores>, u64)| {
+            let rmse = || {
+                let channels = run.iter().flat_map(|material| &material.channels);
+                channels.map(|scores| scores.held_out.rmse)
+            };
+            let (rmse_ratio_to_paper, worst_ratio_to_paper) =
+                ratios(rmse().zip(channels().map(|channel| channel.paper)));
+            OfSeed {
+                seed,
+                rmse_ratio_to_paper,
+                mean_held_out_rmse: mean(rmse()).unwrap_or(0.0),
+                worst_ratio_to_paper,
+            }
         };
         Self {
-            rmse_ratio_to_paper: mean(&mut ratios.iter().map(|ratio| ratio.ln())).map(f64::exp),
-            mean_held_out_rmse: mean(&mut channels().map(|channel| channel.held_out.rmse))
+            rmse_ratio_to_paper,
+            mean_held_out_rmse: mean(channels().map(|c| c.held_out.rmse)).unwrap_or(0.0),
+            worst_ratio_to_paper,
+            mean_held_out_rmse_unsaturated: mean(channels().map(|c| c.held_out_unsaturated.rmse))
                 .unwrap_or(0.0),
-            worst_ratio_to_paper: ratios.into_iter().reduce(f64::max),
+            better_than_paper: Better::of(materials),
+            seeds: runs.iter().zip(seed..).map(of_seed).collect(),
         }
+    }
+}
+
+impl Better {
+    fn of(materials: &[Material]) -> Option<Self> {
+        let channels = || materials.iter().flat_map(|material| &material.channels);
+        channels().any(|channel| channel.paper.is_some()).then(|| {
+            let count = |measure: Measure| {
+                let better = channels().filter_map(|channel| measure.is_better(channel));
+                better.fold((0, 0), |(better, all), is| {
+                    (better + usize::from(is), all + 1)
+                })
+            };
+            Self {
+                rmse: count(Measure::Rmse),
+                mae: count(Measure::Mae),
+                correlation: count(Measure::Correlation),
+            }
+        })
     }
 }
 

@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use comfy_table::{CellAlignment, Table, presets};
 
-use super::{Channel, Paper, Report};
-use crate::protocol::Metrics;
+use super::{Channel, Paper, Report, Summary};
+use crate::metrics::Metrics;
 
 /// Where a table is to be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,22 +14,36 @@ pub(super) enum Style {
     Markdown,
 }
 
-/// One of the paper's three tables.
+/// A measure of error: the paper's three, each with a table of its own, and those that it lacks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Measure {
     Rmse,
     Mae,
     Correlation,
+    RelativeRmse,
+    LogCosine,
+    CubeRoot,
 }
 
 impl Measure {
-    pub(super) const ALL: [Self; 3] = [Self::Rmse, Self::Mae, Self::Correlation];
+    pub(super) const PAPER: [Self; 3] = [Self::Rmse, Self::Mae, Self::Correlation];
+    pub(super) const ALL: [Self; 6] = [
+        Self::Rmse,
+        Self::Mae,
+        Self::Correlation,
+        Self::RelativeRmse,
+        Self::LogCosine,
+        Self::CubeRoot,
+    ];
 
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Rmse => "rmse",
             Self::Mae => "mae",
             Self::Correlation => "correlation",
+            Self::RelativeRmse => "relative_rmse",
+            Self::LogCosine => "log_cosine_mae",
+            Self::CubeRoot => "cube_root_rmse",
         }
     }
 
@@ -38,6 +52,9 @@ impl Measure {
             Self::Rmse => "Table I: root mean squared error (BRDF in 1/sr)",
             Self::Mae => "Table II: mean absolute error (BRDF in 1/sr)",
             Self::Correlation => "Table III: correlation",
+            Self::RelativeRmse => "RMSE over the root mean square of the measurements",
+            Self::LogCosine => "mean |ln(1 + f cos theta_o) - ln(1 + g cos theta_o)|",
+            Self::CubeRoot => "RMSE of the cube roots",
         }
     }
 
@@ -46,6 +63,9 @@ impl Measure {
             Self::Rmse => Some(metrics.rmse),
             Self::Mae => Some(metrics.mae),
             Self::Correlation => metrics.correlation,
+            Self::RelativeRmse => metrics.relative_rmse,
+            Self::LogCosine => Some(metrics.log_cosine_mae),
+            Self::CubeRoot => Some(metrics.cube_root_rmse),
         }
     }
 
@@ -54,11 +74,22 @@ impl Measure {
             Self::Rmse => Some(paper.rmse),
             Self::Mae => paper.mae,
             Self::Correlation => paper.correlation,
+            Self::RelativeRmse | Self::LogCosine | Self::CubeRoot => None,
         }
     }
 
     fn is_misprint(self, paper: &Paper) -> bool {
         self == Self::Mae && paper.impossible_mae
+    }
+
+    /// Whether the held-out figure is better than the printed one; none where that is missing or
+    /// impossible.
+    pub(super) fn is_better(self, channel: &Channel) -> Option<bool> {
+        let ratio = self.ratio(channel)?;
+        Some(match self {
+            Self::Correlation => ratio > 1.0,
+            _ => ratio < 1.0,
+        })
     }
 
     /// Held out over printed; none where the printed figure is missing or impossible.
@@ -76,7 +107,7 @@ pub(super) fn render(report: &Report, style: Style) -> String {
         .flat_map(|m| &m.channels)
         .any(|c| c.paper.is_some());
     heading(&mut out, report, style);
-    for measure in Measure::ALL {
+    for measure in Measure::PAPER {
         let mark = if style == Style::Markdown { "### " } else { "" };
         let suffix = if report.data.synthetic {
             ", SYNTHETIC stand-in data"
@@ -95,6 +126,18 @@ pub(super) fn render(report: &Report, style: Style) -> String {
             format_args!("{}\n", trim(&table(report, measure, compared, style))),
         );
     }
+    let (mark, end) = match style {
+        Style::Markdown => ("### ", "\n"),
+        Style::Text => ("", ""),
+    };
+    push(
+        &mut out,
+        format_args!(
+            "\n{mark}Beyond the paper: other measures of the held-out predictions, noise and \
+             saturation\n{end}{}\n",
+            trim(&further(report, style))
+        ),
+    );
     summary(&mut out, report, style, compared);
     out
 }
@@ -129,7 +172,7 @@ fn heading(out: &mut String, report: &Report, style: Style) {
         out,
         format_args!(
             "{item}Model: {} ({} inputs, {} target), {} {} neurons, {}; {}-fold cross-validation, \
-         seed {}\n",
+             {}\n",
             protocol.model,
             protocol.features,
             protocol.target,
@@ -137,9 +180,18 @@ fn heading(out: &mut String, report: &Report, style: Style) {
             protocol.activation,
             protocol.solver,
             protocol.folds,
-            protocol.seed,
+            seeds(protocol.seed, protocol.seeds),
         ),
     );
+}
+
+/// The seeds in words.
+pub(super) fn seeds(first: u64, count: usize) -> String {
+    let last = first.saturating_add(count as u64).saturating_sub(1);
+    match count {
+        1 => format!("seed {first}"),
+        _ => format!("mean over seeds {first} to {last}"),
+    }
 }
 
 fn table(report: &Report, measure: Measure, compared: bool, style: Style) -> String {
@@ -147,6 +199,10 @@ fn table(report: &Report, measure: Measure, compared: bool, style: Style) -> Str
     let mut header = vec!["material", "channel", "train", "held out", "fold mean"];
     if compared {
         header.extend(["paper", "held out / paper"]);
+    }
+    let several = report.protocol.seeds > 1;
+    if several {
+        header.insert(4, "+/-");
     }
     let columns = header.len();
     table.set_header(header);
@@ -163,6 +219,10 @@ fn table(report: &Report, measure: Measure, compared: bool, style: Style) -> Str
                 number(measure.of(&channel.held_out)),
                 number(measure.of(&channel.held_out_fold_mean)),
             ];
+            if several {
+                let deviation = channel.held_out_deviation.as_ref();
+                row.insert(4, number(deviation.and_then(|d| measure.of(d))));
+            }
             if compared {
                 let paper = channel.paper;
                 let star = paper.is_some_and(|paper| measure.is_misprint(&paper));
@@ -173,6 +233,47 @@ fn table(report: &Report, measure: Measure, compared: bool, style: Style) -> Str
             }
             debug_assert_eq!(row.len(), columns);
             table.add_row(row);
+        }
+    }
+    table.to_string()
+}
+
+/// The measures that the paper lacks, and what the measurements say of themselves.
+fn further(report: &Report, style: Style) -> String {
+    let mut table = styled(style);
+    table.set_header([
+        "material",
+        "channel",
+        "relative",
+        "log-cosine",
+        "cube root",
+        "noise floor",
+        "RMSE / floor",
+        "suspect",
+        "RMSE without",
+    ]);
+    for column in table.column_iter_mut().skip(2) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    let number = |value: Option<f64>, digits: usize| {
+        value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
+    };
+    for material in &report.materials {
+        for channel in &material.channels {
+            let held_out = &channel.held_out;
+            let floor = channel.noise_floor.map(|floor| floor.sigma);
+            let over = floor.filter(|&floor| floor > 0.0);
+            table.add_row([
+                format!("{:>2} {}", material.id, material.name),
+                channel.channel.clone(),
+                number(held_out.relative_rmse, 3),
+                number(Some(held_out.log_cosine_mae), 5),
+                number(Some(held_out.cube_root_rmse), 4),
+                number(floor, 4),
+                number(over.map(|floor| held_out.rmse / floor), 2),
+                channel.saturated.to_string(),
+                number(Some(channel.held_out_unsaturated.rmse), 4),
+            ]);
         }
     }
     table.to_string()
@@ -216,6 +317,49 @@ fn summary(out: &mut String, report: &Report, style: Style, compared: bool) {
             ),
         );
     }
+    if let Some(better) = summary.better_than_paper {
+        let of = |(better, all): (usize, usize)| format!("{better} of {all}");
+        push(
+            out,
+            format_args!(
+                "{item}Held out better than printed: RMSE {}, MAE {}, correlation {}\n",
+                of(better.rmse),
+                of(better.mae),
+                of(better.correlation)
+            ),
+        );
+    }
+    spread(out, summary, item);
+    if let Some(floor) = data.noise_floor {
+        push(
+            out,
+            format_args!(
+                "{item}'noise floor' is the standard deviation of one measurement that pairs with \
+                 light and viewer exchanged show; its median here is {floor:.4}. Part of that noise \
+                 depends on the directions alone and can be learnt, so an error below it is \
+                 possible.\n"
+            ),
+        );
+    }
+    push(
+        out,
+        format_args!(
+            "{item}Suspect: {} of {} values ({:.2} %) look saturated (highlights whose radiance \
+             piles up at the channel's largest); mean held-out RMSE without them: {:.4}\n",
+            data.saturated,
+            data.values,
+            100.0 * data.saturated as f64 / data.values.max(1) as f64,
+            summary.mean_held_out_rmse_unsaturated
+        ),
+    );
+    let [relative, log_cosine, cube_root] =
+        [Measure::RelativeRmse, Measure::LogCosine, Measure::CubeRoot].map(Measure::title);
+    push(
+        out,
+        format_args!(
+            "{item}'relative': {relative}; 'log-cosine': {log_cosine}; 'cube root': {cube_root}.\n"
+        ),
+    );
     if compared && data.channels == ["average"] {
         push(
             out,
@@ -256,6 +400,41 @@ fn summary(out: &mut String, report: &Report, style: Style, compared: bool) {
             "{item}Seconds: {:.3} load, {:.3} fit and evaluate, {:.3} total\n",
             seconds.load, seconds.fit, seconds.total
         ),
+    );
+}
+
+/// Mean and range over the seeds.
+fn spread(out: &mut String, summary: &Summary, item: &str) {
+    let seeds = &summary.seeds;
+    if seeds.len() < 2 {
+        return;
+    }
+    let range = |values: Vec<f64>| {
+        let (least, most) = (
+            values.iter().copied().fold(f64::INFINITY, f64::min),
+            values.iter().copied().fold(0.0, f64::max),
+        );
+        (least, most)
+    };
+    let (least, most) = range(seeds.iter().map(|seed| seed.mean_held_out_rmse).collect());
+    push(
+        out,
+        format_args!(
+            "{item}Over {} seeds the mean held-out RMSE runs from {least:.4} to {most:.4}",
+            seeds.len()
+        ),
+    );
+    let ratios: Vec<f64> = seeds.iter().filter_map(|s| s.rmse_ratio_to_paper).collect();
+    if !ratios.is_empty() {
+        let (least, most) = range(ratios);
+        push(
+            out,
+            format_args!(", the ratio to the printed RMSE from {least:.2} to {most:.2}"),
+        );
+    }
+    push(
+        out,
+        format_args!("; '+/-' is the standard deviation over seeds.\n"),
     );
 }
 

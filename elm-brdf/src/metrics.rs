@@ -1,0 +1,238 @@
+//! Measures of error of a reflectance model's predictions; every table and file takes them from
+//! here.
+
+use elm::metrics;
+use ndarray::{Array1, ArrayView2, Zip};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+use crate::geometry::Pair;
+
+/// Measures of error of a set of predictions $f$ against the truth $g$, over all rows and channels
+/// together.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Metrics {
+    /// Root mean squared error in 1/sr.
+    pub rmse: f64,
+    /// Mean absolute error in 1/sr.
+    pub mae: f64,
+    /// Pearson's correlation coefficient; `None` where it does not exist.
+    pub correlation: Option<f64>,
+    /// Root mean squared error over the root mean square of the truth: 0 is perfect, 1 is what
+    /// black reaches. `None` where all of the truth is 0.
+    pub relative_rmse: Option<f64>,
+    /// Mean of $|\ln(1 + f \cos\theta_o) - \ln(1 + g \cos\theta_o)|$, the measure of NBRDF
+    /// (A. Sztrajman, G. Rainer, T. Ritschel, T. Weyrich, *Neural BRDF Representation and
+    /// Importance Sampling*, Computer Graphics Forum 40(6), 2021): highlights do not drown the
+    /// rest.
+    pub log_cosine_mae: f64,
+    /// Root mean squared error of the cube roots, in sr to the power -1/3: dark parts count about
+    /// as the eye sees them.
+    pub cube_root_rmse: f64,
+}
+
+impl Metrics {
+    /// The errors of `predicted` against `truth`, both BRDF in 1/sr without the cosine, of shape
+    /// (pairs, channels), at these pairs of directions.
+    ///
+    /// A viewer below the horizon has the cosine 0. A value so negative that the logarithm does
+    /// not exist is taken for the most negative one that has one.
+    ///
+    /// # Errors
+    /// [`elm::Error`] where shapes differ or there is nothing to compare.
+    ///
+    /// ```
+    /// use elm_brdf::{geometry::{Pair, cartesian}, metrics::Metrics};
+    /// use ndarray::array;
+    ///
+    /// let pair = Pair { incident: cartesian(0.3, 0.0), outgoing: cartesian(0.0, 0.0) };
+    /// let metrics = Metrics::of(&[pair], array![[0.5, 1.0]].view(), array![[0.5, 2.0]].view())?;
+    /// assert_eq!(metrics.mae, 0.5);
+    /// // The first channel agrees; ln 3 - ln 2 in the second.
+    /// assert!((metrics.log_cosine_mae - 1.5_f64.ln() / 2.0).abs() < 1e-15);
+    /// # Ok::<(), elm_brdf::Error>(())
+    /// ```
+    pub fn of(
+        pairs: &[Pair],
+        predicted: ArrayView2<'_, f64>,
+        truth: ArrayView2<'_, f64>,
+    ) -> Result<Self> {
+        let shape = |what, expected, found| {
+            Error::Elm(elm::Error::Shape {
+                what,
+                expected,
+                found,
+            })
+        };
+        if predicted.ncols() != truth.ncols() {
+            return Err(shape("channels", truth.ncols(), predicted.ncols()));
+        }
+        if predicted.nrows() != truth.nrows() {
+            return Err(shape("predictions", truth.nrows(), predicted.nrows()));
+        }
+        if pairs.len() != truth.nrows() {
+            return Err(shape("directions", truth.nrows(), pairs.len()));
+        }
+        let flat = |values: ArrayView2<'_, f64>| values.iter().copied().collect::<Array1<f64>>();
+        let (p, t) = (flat(predicted), flat(truth));
+        let rmse = metrics::rmse(&p, &t)?;
+        let scale = metrics::rmse(&Array1::zeros(t.len()), &t)?;
+        let mut log_cosine = 0.0;
+        for ((pair, predicted), truth) in pairs.iter().zip(predicted.rows()).zip(truth.rows()) {
+            let cos = pair.outgoing[2].max(0.0);
+            Zip::from(predicted).and(truth).for_each(|&f, &g| {
+                log_cosine += (log_one_plus(f * cos) - log_one_plus(g * cos)).abs();
+            });
+        }
+        Ok(Self {
+            rmse,
+            mae: metrics::mae(&p, &t)?,
+            correlation: metrics::correlation(&p, &t)?,
+            relative_rmse: (scale > 0.0).then(|| rmse / scale),
+            log_cosine_mae: log_cosine / t.len() as f64,
+            cube_root_rmse: metrics::rmse(&p.mapv(f64::cbrt), &t.mapv(f64::cbrt))?,
+        })
+    }
+
+    /// The mean of each measure over those that have it; `None` of none.
+    #[must_use]
+    pub fn mean(all: &[Self]) -> Option<Self> {
+        Self::each(all, |values| {
+            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+        })
+    }
+
+    /// The standard deviation of each measure over those that have it, with one less than their
+    /// number for a divisor; `None` of fewer than two.
+    #[must_use]
+    pub fn deviation(all: &[Self]) -> Option<Self> {
+        Self::each(all, |values| {
+            let count = values.len() as f64;
+            let mean = values.iter().sum::<f64>() / count;
+            let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+            (values.len() > 1).then(|| (squares / (count - 1.0)).sqrt())
+        })
+    }
+
+    /// `summary` of the values of each measure.
+    fn each(all: &[Self], summary: impl Fn(&[f64]) -> Option<f64>) -> Option<Self> {
+        let of = |value: fn(&Self) -> Option<f64>| {
+            summary(&all.iter().filter_map(value).collect::<Vec<f64>>())
+        };
+        Some(Self {
+            rmse: of(|m| Some(m.rmse))?,
+            mae: of(|m| Some(m.mae))?,
+            correlation: of(|m| m.correlation),
+            relative_rmse: of(|m| m.relative_rmse),
+            log_cosine_mae: of(|m| Some(m.log_cosine_mae))?,
+            cube_root_rmse: of(|m| Some(m.cube_root_rmse))?,
+        })
+    }
+}
+
+fn log_one_plus(x: f64) -> f64 {
+    // `max` would turn a NaN into a number.
+    if x < f64::EPSILON - 1.0 {
+        f64::EPSILON.ln()
+    } else {
+        x.ln_1p()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::cartesian;
+    use approx::assert_abs_diff_eq;
+    use ndarray::{Array2, array};
+
+    fn seen_at(theta_o: f64) -> Pair {
+        Pair {
+            incident: cartesian(0.2, 0.0),
+            outgoing: cartesian(theta_o, 1.0),
+        }
+    }
+
+    #[test]
+    fn figures_are_those_computed_by_hand() {
+        let pairs = [seen_at(0.0), seen_at(60_f64.to_radians())];
+        let metrics = Metrics::of(
+            &pairs,
+            array![[1.0], [8.0]].view(),
+            array![[0.0], [1.0]].view(),
+        )
+        .unwrap();
+        // Errors 1 and 7; truth 0 and 1.
+        assert_abs_diff_eq!(metrics.rmse, 5.0, epsilon = 1e-14);
+        assert_abs_diff_eq!(metrics.mae, 4.0, epsilon = 1e-14);
+        assert_abs_diff_eq!(
+            metrics.relative_rmse.unwrap(),
+            50_f64.sqrt(),
+            epsilon = 1e-13
+        );
+        // cos 60 degrees is 1/2: ln 2 - ln 1, and ln 5 - ln 1.5.
+        let expected = (2_f64.ln() + (5.0 / 1.5_f64).ln()) / 2.0;
+        assert_abs_diff_eq!(metrics.log_cosine_mae, expected, epsilon = 1e-14);
+        // Cube roots 1 and 2 against 0 and 1.
+        assert_abs_diff_eq!(metrics.cube_root_rmse, 1.0, epsilon = 1e-14);
+        assert_abs_diff_eq!(metrics.correlation.unwrap(), 1.0, epsilon = 1e-14);
+    }
+
+    #[test]
+    fn perfect_predictions_have_no_error_and_black_truth_no_relative_one() {
+        let pairs = [seen_at(0.3), seen_at(1.0)];
+        let truth = array![[0.1, 0.2], [0.3, 0.0]];
+        let metrics = Metrics::of(&pairs, truth.view(), truth.view()).unwrap();
+        assert_eq!(
+            (metrics.rmse, metrics.log_cosine_mae, metrics.cube_root_rmse),
+            (0.0, 0.0, 0.0)
+        );
+        let black = Array2::zeros((2, 2));
+        let metrics = Metrics::of(&pairs, truth.view(), black.view()).unwrap();
+        assert_eq!((metrics.relative_rmse, metrics.correlation), (None, None));
+        let metrics = Metrics::of(&pairs, black.view(), truth.view()).unwrap();
+        assert_abs_diff_eq!(metrics.relative_rmse.unwrap(), 1.0, epsilon = 1e-15);
+    }
+
+    #[test]
+    fn hugely_negative_predictions_have_finite_measures_and_nan_stays_nan() {
+        let pairs = [seen_at(0.0)];
+        let of = |value| Metrics::of(&pairs, array![[value]].view(), array![[0.1]].view()).unwrap();
+        assert!(of(-3.0).log_cosine_mae.is_finite());
+        assert!(of(f64::NAN).log_cosine_mae.is_nan());
+    }
+
+    #[test]
+    fn shapes_that_do_not_fit_are_errors() {
+        let (pairs, one) = ([seen_at(0.0)], Array2::<f64>::zeros((1, 1)));
+        for (pairs, predicted, truth) in [
+            (&pairs[..], Array2::zeros((1, 2)), one.clone()),
+            (&pairs[..], Array2::zeros((2, 1)), one.clone()),
+            (&[][..], one.clone(), one.clone()),
+            (&[][..], Array2::zeros((0, 1)), Array2::zeros((0, 1))),
+            (&pairs[..], Array2::zeros((1, 0)), Array2::zeros((1, 0))),
+        ] {
+            assert!(Metrics::of(pairs, predicted.view(), truth.view()).is_err());
+        }
+    }
+
+    #[test]
+    fn means_and_deviations_leave_out_what_does_not_exist() {
+        let pairs = [seen_at(0.0)];
+        let single = Metrics::of(&pairs, array![[0.2]].view(), array![[0.1]].view()).unwrap();
+        let with = Metrics {
+            correlation: Some(0.5),
+            rmse: 0.3,
+            ..single
+        };
+        let mean = Metrics::mean(&[single, with]).unwrap();
+        assert_eq!(mean.correlation, Some(0.5));
+        assert_abs_diff_eq!(mean.rmse, 0.2, epsilon = 1e-15);
+        assert_eq!(Metrics::mean(&[]), None);
+        // Two values apart by d deviate by d / sqrt 2.
+        let deviation = Metrics::deviation(&[single, with]).unwrap();
+        assert_abs_diff_eq!(deviation.rmse, 0.2 / 2_f64.sqrt(), epsilon = 1e-15);
+        assert_eq!(deviation.correlation, None);
+        assert_eq!(Metrics::deviation(&[single]), None);
+    }
+}
