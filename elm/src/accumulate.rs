@@ -42,7 +42,7 @@ use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2, Axis
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::hidden::{Biases, HiddenLayer};
+use crate::hidden::HiddenLayer;
 use crate::linalg::Triangular;
 use crate::model::{CheckedParams, Targets};
 use crate::network::{Elm, design};
@@ -83,7 +83,7 @@ impl<A: Scalar> Accumulator<A> {
     /// all accumulators that are to be merged.
     ///
     /// # Errors
-    /// [`Error::Conflict`] when the parameters switch standardisation off, lay biases on the data
+    /// [`Error::Conflict`] when the parameters switch standardisation off, lay biases or centres on the data
     /// or ask for the solver [`Inverse`](crate::solve::Inverse); [`Error::Parameter`] for 0
     /// outputs; [`Error::Shape`] for input scales; [`Error::TooLarge`].
     pub fn with_scaler(
@@ -97,9 +97,9 @@ impl<A: Scalar> Accumulator<A> {
                 second: "a scaler",
             });
         }
-        if params.biases() == Biases::OnData {
+        if params.needs_rows() {
             return Err(Error::Conflict {
-                first: "biases on the data",
+                first: "biases or centres on the data",
                 second: "a layer drawn before there are rows",
             });
         }

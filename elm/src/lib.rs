@@ -20,11 +20,14 @@
 //!
 //! - [`ElmParams`] holds the settings, [`Elm`] the fitted network, [`Predictor`]
 //!   its weights packed for evaluation.
-//! - [`Activation`] is the neurons' function, one of eight or your own.
+//! - [`Activation`] is the neurons' function, one of eight or your own; [`Kind`] says what it is
+//!   applied to, a weighted sum or the distance from a centre. [`Neurons`] of several kinds may
+//!   stand in one layer.
 //! - [`solve`] has the solvers: equations 10 and 11 of the ELM literature, and ridge regression
 //!   with its strength chosen by exact leave-one-out, which is the default.
 //! - [`validate`] has held-out predictions in closed form, leave-one-out and k-fold.
 //! - [`Accumulator`] fits to rows that arrive in pieces.
+//! - [`prune`] keeps the most useful of many neurons.
 //! - [`tune`] chooses scale, neurons and inputs; [`uncertainty`] says how far a prediction can be
 //!   trusted; [`persist`] keeps a network in a file.
 //! - [`metrics`] has RMSE, MAE and correlation.
@@ -53,6 +56,7 @@ mod model;
 mod network;
 pub mod persist;
 mod predictor;
+pub mod prune;
 mod scalar;
 mod scaler;
 mod simd;
@@ -64,7 +68,7 @@ pub mod validate;
 pub use accumulate::Accumulator;
 pub use activation::{Accuracy, Activation};
 pub use error::{Error, Result};
-pub use hidden::{Biases, Distribution, HiddenLayer};
+pub use hidden::{Biases, Distribution, Group, HiddenLayer, Kind, Neurons};
 pub use linalg::backend;
 pub use model::{CheckedParams, ElmParams, Targets};
 pub use network::Elm;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::activation::Activation;
 use crate::error::{Error, Result};
-use crate::hidden::{Biases, Distribution, HiddenLayer, Plan};
+use crate::hidden::{Biases, Distribution, HiddenLayer, Kind, Neurons, Plan};
 use crate::network::{Elm, design};
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
@@ -21,6 +21,8 @@ use crate::validate::{HeldOut, Validator};
 /// |---|---|---|---|
 /// | `neurons` | (required) | size of the random layer | at least 1 |
 /// | [`activation`](Self::activation) | sigmoid | the function $f$ of equation 7 | |
+/// | [`kind`](Self::kind) | projection | what the function is applied to: a weighted sum or a distance | |
+/// | [`and`](Self::and) | none | neurons of other kinds beside these | scales positive |
 /// | [`distribution`](Self::distribution) | uniform | what weights and biases are drawn from | |
 /// | [`scale`](Self::scale) | 1 | multiplies the random weights: how nonlinear the network is, and its most influential setting | positive |
 /// | [`input_scales`](Self::input_scales) | none | multiply the weights of each input | one per input, not negative |
@@ -47,12 +49,13 @@ use crate::validate::{HeldOut, Validator};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct ElmParams<A: Scalar> {
-    neurons: usize,
-    activation: Activation<A>,
+    /// The neurons that the setters here describe.
+    neurons: Neurons<A>,
+    /// Those of other kinds.
+    others: Vec<Neurons<A>>,
     distribution: Distribution,
     scale: f64,
     input_scales: Vec<f64>,
-    biases: Biases,
     seed: u64,
     solver: Solver,
     intercept: Option<bool>,
@@ -65,12 +68,11 @@ impl<A: Scalar> ElmParams<A> {
     #[must_use]
     pub fn new(neurons: usize) -> Self {
         Self {
-            neurons,
-            activation: Activation::default(),
+            neurons: Neurons::new(neurons, Activation::default()),
+            others: Vec::new(),
             distribution: Distribution::default(),
             scale: 1.0,
             input_scales: Vec::new(),
-            biases: Biases::default(),
             seed: 0,
             solver: Solver::default(),
             intercept: None,
@@ -79,15 +81,37 @@ impl<A: Scalar> ElmParams<A> {
         }
     }
 
-    /// Another number of hidden neurons.
+    /// Another number of hidden neurons in all. Where there are several kinds, each keeps its share
+    /// of them, to within one.
     #[must_use]
     pub fn with_neurons(mut self, neurons: usize) -> Self {
-        self.neurons = neurons;
+        let before = self.neurons();
+        let (mut counted, mut given) = (0.0, 0);
+        for group in self.groups_mut() {
+            counted += group.count as f64;
+            let up_to_here = if counted < before as f64 {
+                (neurons as f64 * (counted / before as f64)).round() as usize
+            } else {
+                neurons
+            };
+            group.count = up_to_here.max(given) - given;
+            given += group.count;
+        }
         self
     }
 
+    fn groups(&self) -> impl Iterator<Item = &Neurons<A>> {
+        std::iter::once(&self.neurons).chain(&self.others)
+    }
+
+    fn groups_mut(&mut self) -> impl Iterator<Item = &mut Neurons<A>> {
+        std::iter::once(&mut self.neurons).chain(&mut self.others)
+    }
+
+    /// Neurons of all kinds.
     pub(crate) fn neurons(&self) -> usize {
-        self.neurons
+        let add = |sum: usize, group: &Neurons<A>| sum.saturating_add(group.count);
+        self.groups().fold(0, add)
     }
 
     pub(crate) fn get_seed(&self) -> u64 {
@@ -97,7 +121,23 @@ impl<A: Scalar> ElmParams<A> {
     /// The activation function of the hidden neurons.
     #[must_use]
     pub fn activation(mut self, activation: Activation<A>) -> Self {
-        self.activation = activation;
+        self.neurons.activation = activation;
+        self
+    }
+
+    /// What the activation function is applied to.
+    #[must_use]
+    pub fn kind(mut self, kind: Kind) -> Self {
+        self.neurons.kind = kind;
+        self
+    }
+
+    /// Adds neurons of another kind to the layer. Everything but what [`Neurons`] sets they have in
+    /// common with the others: the distribution, the [`scale`](Self::scale), which theirs multiplies,
+    /// the [`input_scales`](Self::input_scales) and the seed.
+    #[must_use]
+    pub fn and(mut self, neurons: Neurons<A>) -> Self {
+        self.others.push(neurons);
         self
     }
 
@@ -126,7 +166,7 @@ impl<A: Scalar> ElmParams<A> {
     /// Where the random biases come from.
     #[must_use]
     pub fn biases(mut self, biases: Biases) -> Self {
-        self.biases = biases;
+        self.neurons.biases = biases;
         self
     }
 
@@ -179,7 +219,7 @@ impl<A: Scalar> ElmParams<A> {
                 expected,
             })
         };
-        if self.neurons == 0 {
+        if self.neurons() == 0 {
             return parameter("neurons", 0.0, "at least 1");
         }
         // Written so that NaN fails too.
@@ -194,10 +234,15 @@ impl<A: Scalar> ElmParams<A> {
         {
             return parameter("input_scales", value, "finite and not negative");
         }
-        if let Biases::Scaled(value) = self.biases
-            && !not_negative(value)
-        {
-            return parameter("biases", value, "finite and not negative");
+        for group in self.groups() {
+            if !(group.scale > 0.0 && group.scale.is_finite()) {
+                return parameter("scale of neurons", group.scale, "positive and finite");
+            }
+            if let Biases::Scaled(value) = group.biases
+                && !not_negative(value)
+            {
+                return parameter("biases", value, "finite and not negative");
+            }
         }
         self.solver.check()?;
         Ok(CheckedParams(self))
@@ -205,12 +250,10 @@ impl<A: Scalar> ElmParams<A> {
 
     fn plan(&self) -> Plan<A> {
         Plan {
-            neurons: self.neurons,
-            activation: self.activation.clone(),
+            groups: self.groups().cloned().collect(),
             distribution: self.distribution,
             scale: self.scale,
             input_scales: self.input_scales.clone(),
-            biases: self.biases,
             seed: self.seed,
         }
     }
@@ -316,14 +359,14 @@ impl<A: Scalar> CheckedParams<A> {
     }
 
     /// Checks the data, draws the layer and applies it.
-    fn draw(&self, x: ArrayView2<'_, A>, t: ArrayView2<'_, A>) -> Result<Drawn<A>> {
+    pub(crate) fn draw(&self, x: ArrayView2<'_, A>, t: ArrayView2<'_, A>) -> Result<Drawn<A>> {
         let params = &self.0;
         check_matrix("inputs", x)?;
         check_matrix("targets", t)?;
         check_length("rows of targets", t.nrows(), x.nrows())?;
 
         // Asked before anything is drawn, as a failed allocation would abort the program.
-        check_room("the hidden-layer matrix", x.nrows(), params.neurons)?;
+        check_room("the hidden-layer matrix", x.nrows(), params.neurons())?;
         let scaler = params.standardise.then(|| Scaler::measure(x));
         let scaled = scaler.as_ref().map(|scaler| scaler.transform(x));
         let x = scaled.as_ref().map_or(x, |scaled| scaled.view());
@@ -349,21 +392,21 @@ impl<A: Scalar> CheckedParams<A> {
         }
     }
 
-    /// The random layer for these (standardised) rows, of which only
-    /// [`Biases::OnData`] uses more than the number of inputs.
+    /// The random layer for these (standardised) rows.
     pub(crate) fn layer(&self, x: ArrayView2<'_, A>) -> Result<HiddenLayer<A>> {
         let params = &self.0;
         // A failed allocation would abort the program.
         let per_neuron = x.ncols().saturating_add(1);
-        check_room("the hidden layer", per_neuron, params.neurons)?;
+        check_room("the hidden layer", per_neuron, params.neurons())?;
         if !params.input_scales.is_empty() {
             check_length("input scales", params.input_scales.len(), x.ncols())?;
         }
-        Ok(HiddenLayer::draw(x, &params.plan()))
+        Ok(params.plan().draw(x))
     }
 
-    pub(crate) fn biases(&self) -> Biases {
-        self.0.biases
+    /// Whether the layer takes more of the rows than the number of their inputs.
+    pub(crate) fn needs_rows(&self) -> bool {
+        self.0.groups().any(Neurons::need_rows)
     }
 
     /// Equation 10 has no room for a constant; asking for both explicitly is an error later.
@@ -392,10 +435,10 @@ impl<A: Scalar> CheckedParams<A> {
 }
 
 /// A random layer and what it makes of the training inputs.
-struct Drawn<A: Scalar> {
-    scaler: Option<Scaler<A>>,
-    hidden: HiddenLayer<A>,
-    design: Array2<A>,
+pub(crate) struct Drawn<A: Scalar> {
+    pub(crate) scaler: Option<Scaler<A>>,
+    pub(crate) hidden: HiddenLayer<A>,
+    pub(crate) design: Array2<A>,
 }
 
 /// Training targets: a matrix of shape (rows, outputs), or a vector for a single output.

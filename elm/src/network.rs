@@ -8,7 +8,8 @@ use crate::hidden::HiddenLayer;
 use crate::predictor::Predictor;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
-use crate::solve::{Diagnosis, Solution, check_length, check_matrix};
+use crate::solve::spectrum::norm;
+use crate::solve::{Diagnosis, Reason, Solution, check_length, check_matrix};
 
 /// Project, activate, and append the inputs where they are linked directly.
 pub(crate) fn design<A: Scalar>(
@@ -57,12 +58,9 @@ pub(crate) fn check_layer<A: Scalar>(
     hidden: &HiddenLayer<A>,
     scaler: Option<&Scaler<A>>,
 ) -> Result<()> {
-    let (inputs, neurons) = hidden.weights().dim();
-    check_matrix("hidden weights", hidden.weights())?;
-    check_length("hidden biases", hidden.biases().len(), neurons)?;
-    check_matrix("hidden biases", hidden.biases().insert_axis(Axis(0)))?;
+    hidden.check()?;
     for vector in scaler.iter().flat_map(|s| [s.mean(), s.factor()]) {
-        check_length("inputs of the scaler", vector.len(), inputs)?;
+        check_length("inputs of the scaler", vector.len(), hidden.inputs())?;
         check_matrix("the scaler", vector.insert_axis(Axis(0)))?;
     }
     Ok(())
@@ -118,6 +116,71 @@ impl<A: Scalar> Elm<A> {
             intercept,
             diagnosis,
         }
+    }
+
+    /// The network whose predictions are the mean of those of `members`, which were fitted to the
+    /// same rows with the same settings but for their seeds. What its diagnosis has to say of
+    /// residuals [`set_errors`](Self::set_errors) fills in; of one member it is that one.
+    pub(crate) fn mean(members: &[&Self]) -> Self {
+        let first = members[0];
+        if members.len() == 1 {
+            return first.clone();
+        }
+        let count = members.len() as f64;
+        let share = A::from_f64(count).recip();
+        let layers: Vec<_> = members.iter().map(|member| &member.hidden).collect();
+        let (hidden, order) = HiddenLayer::join(&layers);
+        let neurons = order.len();
+        let links = first.beta.nrows() - first.hidden.neurons();
+        let mut beta = Array2::zeros((neurons + links, first.outputs()));
+        for (mut row, &(member, neuron)) in beta.rows_mut().into_iter().zip(&order) {
+            row.assign(&members[member].beta.row(neuron).mapv(|b| b * share));
+        }
+        let mut intercept = Array1::zeros(first.outputs());
+        for member in members {
+            intercept.scaled_add(share, &member.intercept);
+            let own = member
+                .beta
+                .slice(ndarray::s![member.hidden.neurons().., ..]);
+            beta.slice_mut(ndarray::s![neurons.., ..])
+                .scaled_add(share, &own);
+        }
+        let mean = |of: fn(&Diagnosis) -> &Vec<f64>| -> Vec<f64> {
+            let sum =
+                |output: usize| -> f64 { members.iter().map(|m| of(&m.diagnosis)[output]).sum() };
+            (0..first.outputs()).map(|o| sum(o) / count).collect()
+        };
+        // The geometric mean: strengths differ by powers of ten.
+        let lambda = |output: usize| {
+            let logs = members.iter().map(|m| m.diagnosis.lambda[output].ln());
+            (logs.sum::<f64>() / count).exp()
+        };
+        let diagnosis = Diagnosis {
+            reason: Reason::Mean,
+            rank: None,
+            condition: None,
+            smallest_singular_value: None,
+            lambda: (0..first.outputs()).map(lambda).collect(),
+            degrees_of_freedom: mean(|d| &d.degrees_of_freedom),
+            beta_norm: beta.columns().into_iter().map(norm).collect(),
+            ..first.diagnosis.clone()
+        };
+        Self {
+            scaler: first.scaler.clone(),
+            hidden,
+            direct_links: first.direct_links,
+            beta,
+            intercept,
+            diagnosis,
+        }
+    }
+
+    /// Records residuals and leave-one-out residuals, shape (rows, outputs), in the diagnosis.
+    pub(crate) fn set_errors(&mut self, residuals: ArrayView2<'_, A>, left_out: ArrayView2<'_, A>) {
+        let root_rows = (left_out.nrows() as f64).sqrt();
+        let left_out = left_out.columns().into_iter().map(norm);
+        self.diagnosis.residual_norm = residuals.columns().into_iter().map(norm).collect();
+        self.diagnosis.leave_one_out = Some(left_out.map(|norm| norm / root_rows).collect());
     }
 
     /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs).

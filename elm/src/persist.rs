@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::accumulate::Accumulator;
 use crate::activation::Activation;
-use crate::hidden::HiddenLayer;
+use crate::hidden::{Group, HiddenLayer};
 use crate::network::Elm;
 use crate::scalar::Scalar;
 
@@ -156,11 +156,15 @@ impl<A: Scalar> Persist for Accumulator<A> {
 }
 
 fn not_custom<A: Scalar>(hidden: &HiddenLayer<A>) -> Result<(), Error> {
-    match hidden.activation() {
-        Activation::Custom(_) => Err(Error::CustomActivation {
-            name: hidden.activation().name().to_owned(),
+    let functions = hidden.groups().iter().map(Group::activation);
+    match functions
+        .into_iter()
+        .find(|f| matches!(f, Activation::Custom(_)))
+    {
+        Some(custom) => Err(Error::CustomActivation {
+            name: custom.name().to_owned(),
         }),
-        _ => Ok(()),
+        None => Ok(()),
     }
 }
 

@@ -31,7 +31,7 @@
 //! # Ok::<(), elm::Error>(())
 //! ```
 
-use ndarray::{Array1, Array2, ArrayRef2, Axis, Zip};
+use ndarray::{Array1, Array2, ArrayRef2, ArrayView2, Axis, Zip, s};
 
 use crate::error::{Error, Result};
 use crate::model::{CheckedParams, ElmParams, Targets};
@@ -40,20 +40,45 @@ use crate::scalar::Scalar;
 use crate::solve::Solver;
 use crate::validate::Validator;
 
-/// A fitted network that knows how far off it may be; made by [`ElmParams::fit_uncertain`].
+/// A fitted network that knows how far off it may be; made by [`ElmParams::fit_uncertain`] and
+/// [`ElmParams::fit_ensemble`].
 ///
 /// Keeps one number per training row and neuron beside the network.
 #[derive(Debug, Clone)]
 pub struct UncertainElm<A: Scalar> {
+    /// The mean of the members, the member itself where there is one.
     model: Elm<A>,
-    validator: Validator<A>,
-    /// Leave-one-out residuals, shape (rows, outputs).
+    members: Vec<Member<A>>,
+    /// Leave-one-out residuals of the mean, shape (rows, outputs).
     left_out: Array2<A>,
     /// Estimated standard deviation of the noise, per output.
     noise: Array1<A>,
 }
 
+/// One of the networks whose mean is predicted.
+#[derive(Debug, Clone)]
+struct Member<A: Scalar> {
+    model: Elm<A>,
+    validator: Validator<A>,
+    /// Leave-one-out residuals, shape (rows, outputs).
+    left_out: Array2<A>,
+}
+
 impl<A: Scalar> ElmParams<A> {
+    /// Fits the mean of this many networks, which differ in their seeds alone: the parameters' seed
+    /// and those that follow it. See [`CheckedParams::fit_ensemble`].
+    ///
+    /// # Errors
+    /// Those of [`check`](Self::check) and [`CheckedParams::fit_ensemble`].
+    pub fn fit_ensemble<T: Targets<A>>(
+        &self,
+        members: usize,
+        x: &ArrayRef2<A>,
+        t: &T,
+    ) -> Result<UncertainElm<A>> {
+        self.clone().check()?.fit_ensemble(members, x, t)
+    }
+
     /// Fits, and keeps what [`uncertainty`](crate::uncertainty) needs.
     ///
     /// # Errors
@@ -70,6 +95,59 @@ impl<A: Scalar> CheckedParams<A> {
     /// Those of [`fit`](Self::fit); [`Error::Conflict`] unless the solver is ridge;
     /// [`Error::Undetermined`] when a row cannot be left out, as of a single one.
     pub fn fit_uncertain<T: Targets<A>>(&self, x: &ArrayRef2<A>, t: &T) -> Result<UncertainElm<A>> {
+        let member = self.fit_member(x, t)?;
+        UncertainElm::new(vec![member], x, t.as_matrix())
+    }
+
+    /// Fits the mean of this many networks, which differ in their seeds alone: the parameters' seed
+    /// and those that follow it. What their random layers do badly, each elsewhere, averages out.
+    ///
+    /// The mean is itself a network, with the neurons of all members side by side:
+    /// [`UncertainElm::model`] predicts, and is packed and saved, like any other. Leaving out a row
+    /// leaves it out of every member, so that the leave-one-out residuals of the mean are the means
+    /// of theirs, exactly; its
+    /// [`Diagnosis`](crate::solve::Diagnosis) has their RMSE, the mean of the members' effective
+    /// degrees of freedom (which is that of the mean) and the geometric mean of their
+    /// $\lambda$. Factorises twice for each member.
+    ///
+    /// ```
+    /// use elm::ElmParams;
+    /// use ndarray::{Array1, Axis};
+    ///
+    /// let x = Array1::linspace(-3.0, 3.0, 80).insert_axis(Axis(1));
+    /// let t = x.mapv(|x: f64| x.sin() + 0.05 * (37.0 * x).sin());
+    /// let five = ElmParams::new(20).fit_ensemble(5, &x, &t)?;
+    /// assert_eq!(five.model().hidden().neurons(), 100);
+    /// let mean = five.leave_one_out()[0];
+    /// let alone = five.members_leave_one_out().column(0).sum() / 5.0;
+    /// assert!(mean <= alone); // always: the mean of squares is at least the square of the mean
+    /// # Ok::<(), elm::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for 0 members; those of [`fit_uncertain`](Self::fit_uncertain).
+    pub fn fit_ensemble<T: Targets<A>>(
+        &self,
+        members: usize,
+        x: &ArrayRef2<A>,
+        t: &T,
+    ) -> Result<UncertainElm<A>> {
+        if members == 0 {
+            return Err(Error::Parameter {
+                name: "members",
+                value: 0.0,
+                expected: "at least 1",
+            });
+        }
+        let member = |number| {
+            let seed = self.params().get_seed().wrapping_add(number);
+            self.params().clone().seed(seed).check()?.fit_member(x, t)
+        };
+        let members = (0..members as u64).map(member).collect::<Result<_>>()?;
+        UncertainElm::new(members, x, t.as_matrix())
+    }
+
+    fn fit_member<T: Targets<A>>(&self, x: &ArrayRef2<A>, t: &T) -> Result<Member<A>> {
         if !matches!(self.solver(), Solver::Ridge(_)) {
             return Err(Error::Conflict {
                 first: "a solver other than ridge",
@@ -83,7 +161,27 @@ impl<A: Scalar> CheckedParams<A> {
             .leave_one_out(&model.diagnosis().lambda)?
             .residuals()
             .to_owned();
-        let residuals = &t.as_matrix() - &model.predict(x)?;
+        Ok(Member {
+            model,
+            validator,
+            left_out,
+        })
+    }
+}
+
+impl<A: Scalar> UncertainElm<A> {
+    fn new(members: Vec<Member<A>>, x: &ArrayRef2<A>, t: ArrayView2<'_, A>) -> Result<Self> {
+        let models: Vec<&Elm<A>> = members.iter().map(|member| &member.model).collect();
+        let share = A::from_f64(members.len() as f64).recip();
+        let mut left_out = Array2::zeros(t.dim());
+        for member in &members {
+            left_out.scaled_add(share, &member.left_out);
+        }
+        let mut model = Elm::mean(&models);
+        let residuals = &t - &model.predict(x)?;
+        if members.len() > 1 {
+            model.set_errors(residuals.view(), left_out.view());
+        }
         let rows = A::from_f64(residuals.nrows() as f64);
         let noise = Zip::from(residuals.columns())
             .and(left_out.columns())
@@ -91,20 +189,59 @@ impl<A: Scalar> CheckedParams<A> {
                 // Each product is a square over 1 - h, so only rounding can make it negative.
                 (r.dot(&l).max(A::zero()) / rows).sqrt()
             });
-        Ok(UncertainElm {
+        Ok(Self {
             model,
-            validator,
+            members,
             left_out,
             noise,
         })
     }
-}
 
-impl<A: Scalar> UncertainElm<A> {
-    /// The network.
+    /// The network; of an ensemble the mean of its members.
     #[must_use]
     pub fn model(&self) -> &Elm<A> {
         &self.model
+    }
+
+    /// The networks whose mean [`model`](Self::model) is: one, unless this is an ensemble.
+    pub fn members(&self) -> impl ExactSizeIterator<Item = &Elm<A>> {
+        self.members.iter().map(|member| &member.model)
+    }
+
+    /// The leave-one-out RMSE of each output.
+    #[must_use]
+    pub fn leave_one_out(&self) -> Vec<f64> {
+        root_mean_squares(self.left_out.view()).to_vec()
+    }
+
+    /// The leave-one-out RMSE that each member has by itself, shape (members, outputs): how much
+    /// hangs on the seed, and how much better the mean is.
+    #[must_use]
+    pub fn members_leave_one_out(&self) -> Array2<f64> {
+        let mut all = Array2::zeros((self.members.len(), self.model.outputs()));
+        for (mut row, member) in all.rows_mut().into_iter().zip(&self.members) {
+            row.assign(&root_mean_squares(member.left_out.view()));
+        }
+        all
+    }
+
+    /// The standard deviation of the members' predictions (with divisor one less than their number),
+    /// shape (rows, outputs); 0 for one member. It says how much of a prediction is chance of the
+    /// random layer, and nothing of noise or of what all members get wrong: for that see
+    /// [`predict_deviation`](Self::predict_deviation).
+    ///
+    /// # Errors
+    /// Those of [`Elm::predict`].
+    pub fn members_spread(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
+        let predictions = self.members().map(|member| member.predict(x));
+        let predictions = predictions.collect::<Result<Vec<_>>>()?;
+        let mean = self.model.predict(x)?;
+        let mut squares = Array2::zeros(mean.dim());
+        for prediction in &predictions {
+            squares += &(prediction - &mean).mapv_into(|d| d * d);
+        }
+        let others = A::from_f64(predictions.len().saturating_sub(1).max(1) as f64);
+        finite(squares.mapv_into(|s: A| (s / others).sqrt()))
     }
 
     /// The estimated standard deviation of the noise of each output.
@@ -113,15 +250,23 @@ impl<A: Scalar> UncertainElm<A> {
         &self.noise
     }
 
-    /// The standard deviation of a new observation: shape (rows, inputs) to (rows, outputs).
+    /// The standard deviation of a new observation: shape (rows, inputs) to (rows, outputs). Of an
+    /// ensemble an upper bound: its variance is taken to be the mean of the members' variances, as
+    /// if they all erred alike.
     ///
     /// # Errors
     /// Those of [`Elm::hidden_matrix`]; [`Error::Overflow`].
     pub fn predict_deviation(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
-        let hidden = self.model.hidden_matrix(x)?;
-        let spread = self
-            .validator
-            .posterior_spread(&hidden, &self.model.diagnosis().lambda);
+        let share = A::from_f64(self.members.len() as f64).recip();
+        let mut spread = Array2::zeros((x.nrows(), self.model.outputs()));
+        for Member {
+            model, validator, ..
+        } in &self.members
+        {
+            let hidden = model.hidden_matrix(x)?;
+            let own = validator.posterior_spread(&hidden, &model.diagnosis().lambda);
+            spread.scaled_add(share, &own);
+        }
         let deviation = spread.mapv_into(|s| (A::one() + s).sqrt()) * &self.noise;
         finite(deviation)
     }
@@ -148,7 +293,8 @@ impl<A: Scalar> UncertainElm<A> {
             });
         }
         let predicted = self.model.predict(x)?;
-        let hidden = self.model.hidden_matrix(x)?;
+        let hidden = self.members().map(|member| member.hidden_matrix(x));
+        let hidden = hidden.collect::<Result<Vec<_>>>()?;
         let rows = self.left_out.nrows();
         // The k-th smallest and largest of n ends, k = floor(alpha (n + 1)).
         let outside = ((1.0 - coverage) * (rows as f64 + 1.0) + 1e-9).floor() as usize;
@@ -157,16 +303,22 @@ impl<A: Scalar> UncertainElm<A> {
         if outside == 0 {
             return Ok((low, high));
         }
-        let lambda = &self.model.diagnosis().lambda;
+        let share = A::from_f64(self.members.len() as f64).recip();
         let mut ends = vec![A::zero(); rows];
         for (output, left_out) in self.left_out.columns().into_iter().enumerate() {
-            for (row, hidden) in hidden.axis_chunks_iter(Axis(0), 1).enumerate() {
-                // How much the prediction here moves per unit of each left-out residual.
-                let pull = self.validator.pull(&hidden, lambda[output]);
+            for row in 0..x.nrows() {
+                // How far the prediction here moves when each row is left out.
+                let mut moves = Array1::zeros(rows);
+                for (member, hidden) in self.members.iter().zip(&hidden) {
+                    let lambda = member.model.diagnosis().lambda[output];
+                    let here = hidden.slice(s![row..=row, ..]);
+                    let pull = member.validator.pull(&here, lambda);
+                    moves.scaled_add(share, &(pull * member.left_out.column(output)));
+                }
                 let centre = predicted[[row, output]];
                 let mut end = |sign: A| {
-                    for ((end, &e), &a) in ends.iter_mut().zip(left_out).zip(&pull) {
-                        *end = sign * (centre - e * a) - e.abs();
+                    for ((end, &e), &moved) in ends.iter_mut().zip(left_out).zip(&moves) {
+                        *end = sign * (centre - moved) - e.abs();
                     }
                     let (_, value, _) = ends.select_nth_unstable_by(outside - 1, |a, b| {
                         a.as_f64().total_cmp(&b.as_f64())
@@ -179,6 +331,13 @@ impl<A: Scalar> UncertainElm<A> {
         }
         Ok((low, high))
     }
+}
+
+fn root_mean_squares<A: Scalar>(residuals: ArrayView2<'_, A>) -> Array1<f64> {
+    let ones = Array1::ones(residuals.nrows());
+    residuals.map_axis(Axis(0), |column| {
+        crate::metrics::root_mean_square(column, ones.view())
+    })
 }
 
 fn finite<A: Scalar>(values: Array2<A>) -> Result<Array2<A>> {

@@ -4,7 +4,7 @@
 
 use elm::persist::{self, Error};
 use elm::solve::Ridge;
-use elm::{Accumulator, Activation, Elm, ElmParams};
+use elm::{Accumulator, Activation, Elm, ElmParams, Kind, Neurons};
 use ndarray::{Array2, array, s};
 use proptest::prelude::*;
 
@@ -12,6 +12,13 @@ fn data() -> (Array2<f64>, Array2<f64>) {
     let x = Array2::from_shape_fn((30, 3), |(i, j)| ((i * (j + 2)) as f64 * 0.37).sin());
     let t = Array2::from_shape_fn((30, 2), |(i, j)| x[[i, j]] * x[[i, 2]] + 0.1);
     (x, t)
+}
+
+/// Neurons of three kinds in one layer.
+fn mixed() -> ElmParams<f64> {
+    ElmParams::new(5)
+        .and(Neurons::new(4, Activation::Sine))
+        .and(Neurons::radial(3))
 }
 
 fn models() -> Vec<Elm<f64>> {
@@ -22,6 +29,7 @@ fn models() -> Vec<Elm<f64>> {
         .chain([
             ElmParams::new(5).direct_links(true),
             ElmParams::new(5).standardise(false),
+            mixed(),
         ])
         .map(|params| params.fit(&x, &t).unwrap())
         .collect()
@@ -124,15 +132,20 @@ fn an_accumulator_goes_on_where_its_file_left_off() {
 fn a_custom_activation_is_refused_by_name() {
     let (x, t) = data();
     let cube = Activation::custom("cube", |z: f64| z * z * z);
-    let model = ElmParams::new(4).activation(cube).fit(&x, &t).unwrap();
-    for error in [
-        persist::to_bytes(&model).unwrap_err(),
-        persist::to_json(&model).unwrap_err(),
+    for params in [
+        ElmParams::new(4).activation(cube.clone()),
+        mixed().and(Neurons::new(2, cube).kind(Kind::Radial)),
     ] {
-        assert!(
-            matches!(&error, Error::CustomActivation { name } if name == "cube"),
-            "{error}"
-        );
+        let model = params.fit(&x, &t).unwrap();
+        for error in [
+            persist::to_bytes(&model).unwrap_err(),
+            persist::to_json(&model).unwrap_err(),
+        ] {
+            assert!(
+                matches!(&error, Error::CustomActivation { name } if name == "cube"),
+                "{error}"
+            );
+        }
     }
 }
 
@@ -172,7 +185,9 @@ fn each_kind_of_damage_has_its_own_error() {
 fn a_file_that_contradicts_itself_is_refused() {
     // Valid JSON by a hostile hand: sizes that do not fit together, values that are not finite,
     // and a length that no memory could hold.
-    let text = persist::to_json(&models()[0]).unwrap();
+    let text = persist::to_json(&mixed().fit(&data().0, &data().1).unwrap()).unwrap();
+    let scales =
+        |scales: &[f64]| serde_json::json!({"v": 1, "dim": [scales.len()], "data": scales});
     let value: serde_json::Value = serde_json::from_str(&text).unwrap();
     let mutate = |change: &dyn Fn(&mut serde_json::Value)| {
         let mut value = value.clone();
@@ -189,7 +204,13 @@ fn a_file_that_contradicts_itself_is_refused() {
         mutate(&|c| c["beta"] = serde_json::json!({"v": 1, "dim": [1, 2], "data": [0.0, 0.0]})),
         mutate(&|c| c["scaler"]["mean"] = serde_json::json!({"v": 1, "dim": [1], "data": [0.0]})),
         mutate(&|c| c["beta"]["data"][0] = serde_json::json!(null)),
-        mutate(&|c| c["hidden"]["activation"] = serde_json::json!("cube")),
+        mutate(&|c| c["hidden"]["groups"][0]["activation"] = serde_json::json!("cube")),
+        mutate(&|c| c["hidden"]["groups"][1]["neurons"] = serde_json::json!(5)),
+        mutate(&|c| c["hidden"]["groups"][1]["neurons"] = serde_json::json!(u64::MAX)),
+        mutate(&|c| c["hidden"]["groups"] = serde_json::json!([])),
+        mutate(&|c| c["hidden"]["groups"][2]["radial"]["dim"] = serde_json::json!([2])),
+        mutate(&|c| c["hidden"]["groups"][0]["radial"] = scales(&[0.5, 1.0])),
+        mutate(&|c| c["hidden"]["groups"][2]["radial"]["data"][1] = serde_json::json!(null)),
         mutate(&|c| c["direct_links"] = serde_json::json!(true)),
     ] {
         assert!(
@@ -213,7 +234,8 @@ proptest! {
         fix in any::<bool>(),
     ) {
         let (x, t) = (array![[0.0], [1.0], [2.0]], array![0.0, 1.0, 4.0]);
-        let model = ElmParams::new(3).fit(&x, &t).unwrap();
+        let params = ElmParams::new(3).and(Neurons::radial(2));
+        let model = params.fit(&x, &t).unwrap();
         let mut bytes = if json {
             persist::to_json(&model).unwrap().into_bytes()
         } else {

@@ -25,12 +25,14 @@ pub(super) fn row_blocks(rows: usize) -> impl Iterator<Item = (usize, usize)> {
         .chain((whole..rows).map(|first| (first, 1)))
 }
 
-/// Weighted sums $x \cdot \omega_k + b_k$ of a range of panels for a tile of rows.
+/// Weighted sums $x \cdot \omega_k + b_k$ of a range of panels for a tile of rows; or, of radial
+/// neurons, the distances $\lVert x - \omega_k \rVert$.
 pub(super) struct Project<'a, A: Scalar> {
     pub(super) packed: &'a Packed<A>,
     pub(super) first_panel: usize,
     pub(super) panels: usize,
     pub(super) rows: usize,
+    pub(super) radial: bool,
     /// Inputs by [`row_blocks`], and in a block input by input.
     pub(super) inputs: &'a [A],
     /// Receives `rows` rows of `panels` lines.
@@ -42,6 +44,17 @@ impl<A: Scalar> WithSimd for Project<'_, A> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        if self.radial {
+            self.project::<S, true>(simd);
+        } else {
+            self.project::<S, false>(simd);
+        }
+    }
+}
+
+impl<A: Scalar> Project<'_, A> {
+    #[inline(always)]
+    fn project<S: Simd, const RADIAL: bool>(self, simd: S) {
         let (inputs, panels) = (self.packed.inputs, self.panels);
         let weights = self.packed.hidden(self.first_panel, panels);
         let per_line = A::registers::<S>(&weights[..A::LINE]).0.len();
@@ -55,7 +68,7 @@ impl<A: Scalar> WithSimd for Project<'_, A> {
                 for lane in 0..per_line {
                     let to = &mut hidden[first * per_row + panel * per_line + lane..];
                     let weights = &weights[lane..];
-                    project::<S, A, ROWS, 1>(simd, weights, per_line, 0, x, to, per_row, 0);
+                    project::<S, A, RADIAL, ROWS, 1>(simd, weights, per_line, 0, x, to, per_row, 0);
                 }
             }
         }
@@ -70,11 +83,11 @@ impl<A: Scalar> WithSimd for Project<'_, A> {
                     let to = &mut hidden[panel * per_line + lane..];
                     let weights = &weights[panel * per_panel + lane..];
                     if together == PANELS {
-                        project::<S, A, 1, PANELS>(
+                        project::<S, A, RADIAL, 1, PANELS>(
                             simd, weights, per_line, per_panel, x, to, 0, per_line,
                         );
                     } else {
-                        project::<S, A, 1, 1>(simd, weights, per_line, 0, x, to, 0, 0);
+                        project::<S, A, RADIAL, 1, 1>(simd, weights, per_line, 0, x, to, 0, 0);
                     }
                 }
                 panel += together;
@@ -87,7 +100,7 @@ impl<A: Scalar> WithSimd for Project<'_, A> {
 /// apart and panels `per_panel`; in `to`, rows `row_stride` and panels `panel_stride`.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
-fn project<S: Simd, A: Scalar, const R: usize, const P: usize>(
+fn project<S: Simd, A: Scalar, const RADIAL: bool, const R: usize, const P: usize>(
     simd: S,
     weights: &[A::Register<S>],
     per_line: usize,
@@ -111,13 +124,19 @@ fn project<S: Simd, A: Scalar, const R: usize, const P: usize>(
         for (sums, &x) in sums.iter_mut().zip(x) {
             let x = Lanes::splat(simd, x);
             for (sum, &weight) in sums.iter_mut().zip(&line) {
-                *sum = weight.mul_add(x, *sum);
+                *sum = if RADIAL {
+                    let apart = x - weight;
+                    apart.mul_add(apart, *sum)
+                } else {
+                    weight.mul_add(x, *sum)
+                };
             }
         }
     }
     for (row, sums) in sums.iter().enumerate() {
         for (panel, sum) in sums.iter().enumerate() {
-            to[row * row_stride + panel * panel_stride] = sum.register();
+            let z = if RADIAL { sum.sqrt() } else { *sum };
+            to[row * row_stride + panel * panel_stride] = z.register();
         }
     }
 }

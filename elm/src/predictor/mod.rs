@@ -11,7 +11,7 @@ mod tests;
 
 use ndarray::{Array2, ArrayRef2, ArrayView2, ArrayViewMut2, Axis, aview_mut1, aview1};
 
-use crate::activation::{Accuracy, Activation};
+use crate::activation::Accuracy;
 use crate::error::{Error, Result};
 use crate::network::Elm;
 use crate::scalar::Scalar;
@@ -19,7 +19,7 @@ use crate::scaler::Scaler;
 use crate::simd::Level;
 use crate::solve::check_length;
 use kernels::{Accumulate, Project, row_blocks, sum_of_line};
-use packed::{Aligned, CHUNK_PANELS, Packed, zeros};
+use packed::{Aligned, CHUNK_PANELS, Packed, Panels, zeros};
 
 /// Rows evaluated together.
 const TILE_ROWS: usize = 16;
@@ -55,7 +55,6 @@ const TILE_ROWS: usize = 16;
 pub struct Predictor<A: Scalar> {
     packed: Packed<A>,
     scaler: Option<Scaler<A>>,
-    activation: Activation<A>,
     intercept: Vec<A>,
     accuracy: Accuracy,
     level: Level,
@@ -68,6 +67,8 @@ pub struct Predictor<A: Scalar> {
 pub struct Scratch<A: Scalar> {
     /// A tile of inputs, standardised, as [`Project`] wants them.
     inputs: Aligned<A>,
+    /// The same, multiplied by the scales of a group of radial neurons.
+    scaled: Aligned<A>,
     /// A tile of one chunk of the hidden layer.
     hidden: Aligned<A>,
     /// A tile of sums, a line for each output.
@@ -76,18 +77,16 @@ pub struct Scratch<A: Scalar> {
 
 impl<A: Scalar> Predictor<A> {
     pub(crate) fn new(model: &Elm<A>) -> Self {
-        let hidden = model.hidden();
         Self {
-            packed: Packed::new(hidden.weights(), hidden.biases(), model.beta()),
+            packed: Packed::new(model.hidden(), model.beta()),
             scaler: model.scaler().cloned(),
-            activation: hidden.activation().clone(),
             intercept: model.intercept().to_vec(),
             accuracy: Accuracy::Full,
             level: Level::best(),
         }
     }
 
-    /// How exactly the activation function is evaluated; [`Accuracy::Full`] unless set.
+    /// How exactly activation functions are evaluated; [`Accuracy::Full`] unless set.
     #[must_use]
     pub fn accuracy(mut self, accuracy: Accuracy) -> Self {
         self.accuracy = accuracy;
@@ -122,18 +121,23 @@ impl<A: Scalar> Predictor<A> {
     /// Working memory for this network.
     #[must_use]
     pub fn scratch(&self) -> Scratch<A> {
-        let [inputs, hidden, sums] = self.scratch_lengths();
+        let [inputs, scaled, hidden, sums] = self.scratch_lengths();
         Scratch {
             inputs: zeros(inputs),
+            scaled: zeros(scaled),
             hidden: zeros(hidden),
             sums: zeros(sums),
         }
     }
 
-    fn scratch_lengths(&self) -> [usize; 3] {
-        let panels = self.packed.panels.max(self.packed.link_panels);
+    fn scratch_lengths(&self) -> [usize; 4] {
+        let groups = &self.packed.groups;
+        let neurons = groups.iter().map(|group| group.count);
+        let panels = neurons.chain([self.packed.link_panels]).max().unwrap_or(0);
+        let radial = groups.iter().any(|group| group.radial.is_some());
         [
             TILE_ROWS * self.inputs(),
+            if radial { TILE_ROWS * self.inputs() } else { 0 },
             TILE_ROWS * panels.min(CHUNK_PANELS) * A::LINE,
             TILE_ROWS * self.outputs() * A::LINE,
         ]
@@ -162,8 +166,13 @@ impl<A: Scalar> Predictor<A> {
         scratch: &mut Scratch<A>,
     ) -> Result<()> {
         self.check(x, out)?;
-        let lengths =
-            [&scratch.inputs, &scratch.hidden, &scratch.sums].map(|part| part.as_slice().len());
+        let parts = [
+            &scratch.inputs,
+            &scratch.scaled,
+            &scratch.hidden,
+            &scratch.sums,
+        ];
+        let lengths = parts.map(|part| part.as_slice().len());
         for (found, expected) in lengths.into_iter().zip(self.scratch_lengths()) {
             check_length("scratch", found, expected)?;
         }
@@ -242,25 +251,37 @@ impl<A: Scalar> Predictor<A> {
         let sums = &mut scratch.sums[..rows * packed.outputs * A::LINE];
         sums.fill(A::zero());
 
-        for first_panel in (0..packed.panels).step_by(CHUNK_PANELS) {
-            let panels = CHUNK_PANELS.min(packed.panels - first_panel);
-            let hidden = &mut scratch.hidden[..rows * panels * A::LINE];
-            self.level.run(Project {
-                packed,
-                first_panel,
-                panels,
-                rows,
-                inputs,
-                hidden,
-            });
-            self.activate(hidden, first_panel, panels);
-            self.level.run(Accumulate {
-                packed,
-                first_panel,
-                panels,
-                hidden,
-                sums,
-            });
+        for group in &packed.groups {
+            let inputs = match &group.radial {
+                None => &*inputs,
+                Some(scales) => {
+                    let scaled = &mut scratch.scaled[..rows * packed.inputs];
+                    multiply(inputs, scales, rows, scaled);
+                    &*scaled
+                }
+            };
+            let end = group.first + group.count;
+            for first_panel in (group.first..end).step_by(CHUNK_PANELS) {
+                let panels = CHUNK_PANELS.min(end - first_panel);
+                let hidden = &mut scratch.hidden[..rows * panels * A::LINE];
+                self.level.run(Project {
+                    packed,
+                    first_panel,
+                    panels,
+                    rows,
+                    radial: group.radial.is_some(),
+                    inputs,
+                    hidden,
+                });
+                self.activate(group, hidden, first_panel, panels);
+                self.level.run(Accumulate {
+                    packed,
+                    first_panel,
+                    panels,
+                    hidden,
+                    sums,
+                });
+            }
         }
         for first in (0..packed.link_panels).step_by(CHUNK_PANELS) {
             let panels = CHUNK_PANELS.min(packed.link_panels - first);
@@ -326,19 +347,30 @@ impl<A: Scalar> Predictor<A> {
         })
     }
 
-    fn activate(&self, hidden: &mut [A], first_panel: usize, panels: usize) {
-        if !matches!(self.activation, Activation::Custom(_)) {
-            return self
-                .activation
-                .apply_to_slice(self.level, self.accuracy, hidden);
-        }
-        // A user's function need not be finite at 0, which is what the neurons that only fill up
-        // the last panel would ask for.
-        let used = panels * A::LINE;
-        let used = used.min(self.packed.neurons - first_panel * A::LINE);
+    fn activate(&self, group: &Panels<A>, hidden: &mut [A], first_panel: usize, panels: usize) {
+        let apply = |values: &mut [A]| {
+            let function = &group.activation;
+            function.apply_to_slice(self.level, self.accuracy, values);
+        };
+        let Some(used) = group.used(first_panel, panels) else {
+            return apply(hidden);
+        };
         for row in hidden.chunks_exact_mut(panels * A::LINE) {
-            self.activation
-                .apply_to_slice(self.level, self.accuracy, &mut row[..used]);
+            let (neurons, filling) = row.split_at_mut(used);
+            apply(neurons);
+            filling.fill(A::zero());
+        }
+    }
+}
+
+/// Multiplies inputs, in blocks of rows, by the scale of each.
+fn multiply<A: Scalar>(inputs: &[A], scales: &[A], rows: usize, to: &mut [A]) {
+    for (first, block) in row_blocks(rows) {
+        let part = first * scales.len()..(first + block) * scales.len();
+        let from = inputs[part.clone()].chunks_exact(block);
+        let to = to[part].chunks_exact_mut(block);
+        for ((from, to), &scale) in from.zip(to).zip(scales) {
+            to.iter_mut().zip(from).for_each(|(to, &x)| *to = x * scale);
         }
     }
 }

@@ -1,8 +1,10 @@
 //! A network's weights in the order in which evaluation reads them.
 
 use aligned_vec::{AVec, ConstAlign};
-use ndarray::{ArrayView1, ArrayView2};
+use ndarray::ArrayView2;
 
+use crate::activation::Activation;
+use crate::hidden::{Group, HiddenLayer};
 use crate::scalar::Scalar;
 
 /// Memory that starts at a cache line.
@@ -15,8 +17,19 @@ pub(super) fn zeros<A: Scalar>(length: usize) -> Aligned<A> {
 /// Panels in a chunk. A chunk of hidden values for a tile of rows fits the first-level cache.
 pub(super) const CHUNK_PANELS: usize = 16;
 
+/// Panels of neurons that have one function.
+#[derive(Debug, Clone)]
+pub(super) struct Panels<A: Scalar> {
+    pub(super) first: usize,
+    pub(super) count: usize,
+    pub(super) neurons: usize,
+    pub(super) activation: Activation<A>,
+    /// What radial neurons multiply the inputs by.
+    pub(super) radial: Option<Vec<A>>,
+}
+
 /// Weights by panel: as many neurons as there are values in a cache line, whatever the vector
-/// unit. The last panel is filled up with neurons of weight 0.
+/// unit. The last panel of each group is filled up with neurons of weight 0.
 #[derive(Debug, Clone)]
 pub(super) struct Packed<A: Scalar> {
     pub(super) inputs: usize,
@@ -25,29 +38,60 @@ pub(super) struct Packed<A: Scalar> {
     /// Panels of neurons, and of inputs that reach the outputs directly.
     pub(super) panels: usize,
     pub(super) link_panels: usize,
+    /// The panels of neurons by function.
+    pub(super) groups: Vec<Panels<A>>,
     /// Per panel one line of biases, then a line of weights for each input.
     hidden: Aligned<A>,
     /// Per output one line for each panel of neurons, then for each panel of direct links.
     beta: Aligned<A>,
 }
 
+impl<A: Scalar> Panels<A> {
+    fn new(group: &Group<A>, first: usize, count: usize) -> Self {
+        Self {
+            first,
+            count,
+            neurons: group.neurons(),
+            activation: group.activation().clone(),
+            radial: group.input_scales().map(|scales| scales.to_vec()),
+        }
+    }
+
+    /// Of the neurons in a chunk of these panels how many there really are, where those that only
+    /// fill up the last panel must be kept apart: a user's function need not be finite at 0, and
+    /// a distance may overflow.
+    pub(super) fn used(&self, first: usize, count: usize) -> Option<usize> {
+        let all = count * A::LINE;
+        let used = all.min(self.neurons - (first - self.first) * A::LINE);
+        let apart = self.radial.is_some() || matches!(self.activation, Activation::Custom(_));
+        (apart && used < all).then_some(used)
+    }
+}
+
 impl<A: Scalar> Packed<A> {
-    /// `weights` has shape (inputs, neurons), `beta` (neurons, or neurons + inputs with direct
-    /// links; outputs).
-    pub(super) fn new(
-        weights: ArrayView2<'_, A>,
-        biases: ArrayView1<'_, A>,
-        beta: ArrayView2<'_, A>,
-    ) -> Self {
-        let (inputs, neurons) = weights.dim();
+    /// `beta` has shape (neurons, or neurons + inputs with direct links; outputs).
+    pub(super) fn new(layer: &HiddenLayer<A>, beta: ArrayView2<'_, A>) -> Self {
+        let (inputs, neurons) = layer.weights().dim();
         let links = beta.nrows().saturating_sub(neurons);
-        let (panels, link_panels) = (neurons.div_ceil(A::LINE), links.div_ceil(A::LINE));
+        let link_panels = links.div_ceil(A::LINE);
+        let mut panels = 0;
+        // Of each neuron the place among the panels' neurons.
+        let mut places = Vec::with_capacity(neurons);
+        let mut groups = Vec::with_capacity(layer.groups().len());
+        for group in layer.groups() {
+            let count = group.neurons().div_ceil(A::LINE);
+            places.extend((0..group.neurons()).map(|k| panels * A::LINE + k));
+            groups.push(Panels::new(group, panels, count));
+            panels += count;
+        }
 
         let mut hidden = zeros(panels * (inputs + 1) * A::LINE);
         let panel_length = (inputs + 1) * A::LINE;
-        for (k, (&bias, weights)) in biases.iter().zip(weights.columns()).enumerate() {
+        let weights = layer.weights();
+        let columns = layer.biases().into_iter().zip(weights.columns());
+        for (&k, (bias, weights)) in places.iter().zip(columns) {
             let start = k / A::LINE * panel_length + k % A::LINE;
-            let column = std::iter::once(&bias).chain(weights);
+            let column = std::iter::once(bias).chain(weights);
             let lines = hidden.iter_mut().skip(start).step_by(A::LINE);
             lines.zip(column).for_each(|(to, &from)| *to = from);
         }
@@ -59,12 +103,15 @@ impl<A: Scalar> Packed<A> {
             .zip(beta.columns())
         {
             let (to_neurons, to_links) = to.split_at_mut(panels * A::LINE);
-            let rows = from.iter();
-            to_neurons
+            for (&place, &from) in places.iter().zip(from) {
+                if let Some(to) = to_neurons.get_mut(place) {
+                    *to = from;
+                }
+            }
+            let links = from.iter().skip(neurons);
+            to_links
                 .iter_mut()
-                .take(neurons)
-                .chain(to_links)
-                .zip(rows)
+                .zip(links)
                 .for_each(|(to, &from)| *to = from);
         }
         Self {
@@ -73,6 +120,7 @@ impl<A: Scalar> Packed<A> {
             outputs: beta.ncols(),
             panels,
             link_panels,
+            groups,
             hidden,
             beta: packed_beta,
         }

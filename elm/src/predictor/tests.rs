@@ -6,7 +6,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::ElmParams;
+use crate::activation::Activation;
+use crate::{Biases, ElmParams, Kind, Neurons};
 
 /// Uniform on [-2, 2).
 fn inputs(rows: usize, columns: usize, seed: u64) -> Array2<f64> {
@@ -38,11 +39,28 @@ fn plain(model: &Elm<f64>, x: &Array2<f64>) -> (Array2<f64>, Array2<f64>) {
         .scaler()
         .map_or_else(|| x.clone(), |s| s.transform(x.view()));
     let hidden = model.hidden();
-    let z = x.dot(&hidden.weights()) + hidden.biases();
+    let mut z = x.dot(&hidden.weights()) + hidden.biases();
     // The slope of no function here exceeds 1.
-    let z_size =
+    let mut z_size =
         x.mapv(f64::abs).dot(&hidden.weights().mapv(f64::abs)) + hidden.biases().mapv(f64::abs);
-    let mut h = z.mapv(|z| hidden.activation().apply(z));
+    let mut neuron = 0;
+    for group in hidden.groups() {
+        for k in neuron..neuron + group.neurons() {
+            if let Some(scales) = group.input_scales() {
+                let (scaled, centre) = (&x * &scales, hidden.weights().column(k).to_owned());
+                for (i, row) in scaled.rows().into_iter().enumerate() {
+                    let apart = &row - &centre;
+                    z[[i, k]] = apart.dot(&apart).sqrt();
+                    // Inputs and centres are rounded before their difference.
+                    z_size[[i, k]] = z[[i, k]] + row.dot(&row).sqrt();
+                }
+            }
+            z.column_mut(k)
+                .mapv_inplace(|z| group.activation().apply(z));
+        }
+        neuron += group.neurons();
+    }
+    let mut h = z;
     let mut h_size = h.mapv(f64::abs) + z_size;
     if model.beta().nrows() > hidden.neurons() {
         h = ndarray::concatenate(Axis(1), &[h.view(), x.view()]).unwrap();
@@ -87,6 +105,37 @@ fn every_activation_with_links_and_intercept_is_the_plain_formula_on_every_level
                 let out = model.predictor().level(level).predict(&x).unwrap();
                 assert_is_plain(&model, &x, &out);
             }
+        }
+    }
+}
+
+/// Sigmoid-like, sine and radial neurons, and functions of the user's own on either argument.
+fn mixed(counts: [usize; 3]) -> ElmParams<f64> {
+    let own = Activation::custom("reciprocal", |z: f64| 1.0 / (1e-9 + z).abs().max(1.0));
+    ElmParams::new(counts[0])
+        .activation(Activation::Tanh)
+        .and(Neurons::new(counts[1], Activation::Sine).biases(Biases::OnData))
+        .and(Neurons::radial(counts[2]).scale(0.5))
+        .and(Neurons::new(3, own.clone()))
+        .and(Neurons::new(5, own).kind(Kind::Radial))
+        .and(Neurons::radial(9).scale(0.7))
+}
+
+#[test]
+fn mixed_layers_are_the_plain_formula_on_every_level_alone_and_in_batches() {
+    for (counts, links) in [
+        ([21, 13, 8], true),
+        ([1, 1, 1], false),
+        ([0, 150, 170], true),
+    ] {
+        let model = model(&mixed(counts).direct_links(links), 5, 2);
+        let x = inputs(37, 5, 2);
+        for level in Level::all() {
+            let predictor = model.predictor().level(level);
+            let out = predictor.predict(&x).unwrap();
+            assert_is_plain(&model, &x, &out);
+            let alone = predictor.predict(&x.slice(s![17..18, ..])).unwrap();
+            assert_eq!(alone.row(0), out.row(17));
         }
     }
 }

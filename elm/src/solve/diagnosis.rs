@@ -38,6 +38,8 @@ pub enum Reason {
     /// The given strength is too weak (or far too strong) for the normal equations, or the matrix
     /// is zero.
     WeakRidge,
+    /// It is the mean of several networks, each with an answer of its own.
+    Mean,
 }
 
 /// The state of the problem that was solved, for the user to judge the answer by.

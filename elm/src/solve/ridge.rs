@@ -157,13 +157,11 @@ impl Ridge {
     /// Solves without the rows, from which leave-one-out would choose: by generalised
     /// cross-validation then.
     pub(super) fn solve_spectrum<A: Scalar>(self, spectrum: &Spectrum<A>) -> Solution<A> {
-        let (reason, lambda) = match self.lambda {
-            Lambda::Relative(lambda) => (Reason::WeakRidge, vec![lambda; spectrum.c.ncols()]),
-            Lambda::Gcv | Lambda::LeaveOneOut => {
-                let lambda = self.by_gcv(spectrum, unit_roundoff::<A>());
-                (Reason::StrengthSearch, lambda)
-            }
+        let reason = match self.lambda {
+            Lambda::Relative(_) => Reason::WeakRidge,
+            Lambda::Gcv | Lambda::LeaveOneOut => Reason::StrengthSearch,
         };
+        let lambda = self.strengths_without_rows(spectrum);
         answer(spectrum, reason, &lambda, None)
     }
 
@@ -183,6 +181,14 @@ impl Ridge {
             Lambda::Relative(lambda) => vec![lambda; rows.spectrum.c.ncols()],
             Lambda::Gcv => self.by_gcv(&rows.spectrum, unit_roundoff::<A>()),
             Lambda::LeaveOneOut => self.by_leave_one_out(rows, unit_roundoff::<A>()).0,
+        }
+    }
+
+    /// The same without the rows: by generalised cross-validation where leave-one-out was to choose.
+    pub(crate) fn strengths_without_rows<A: Scalar>(self, spectrum: &Spectrum<A>) -> Vec<f64> {
+        match self.lambda {
+            Lambda::Relative(lambda) => vec![lambda; spectrum.c.ncols()],
+            Lambda::Gcv | Lambda::LeaveOneOut => self.by_gcv(spectrum, unit_roundoff::<A>()),
         }
     }
 

@@ -383,7 +383,7 @@ fn squares<A: Scalar>(matrix: ArrayView2<'_, A>) -> Array1<A> {
 }
 
 /// Euclidean norm, in range wherever the result is.
-pub(super) fn norm<A: Scalar>(column: ArrayView1<'_, A>) -> f64 {
+pub(crate) fn norm<A: Scalar>(column: ArrayView1<'_, A>) -> f64 {
     let largest = column.iter().fold(0.0_f64, |m, v| m.max(v.as_f64().abs()));
     if largest == 0.0 {
         return 0.0;

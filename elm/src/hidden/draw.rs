@@ -1,0 +1,270 @@
+//! Drawing the random layer from a seed.
+
+use ndarray::{Array1, Array2, ArrayView2, s};
+use ndarray_rand::RandomExt;
+use ndarray_rand::rand_distr::{StandardNormal, StandardUniform};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use super::{Group, HiddenLayer};
+use crate::activation::Activation;
+use crate::scalar::Scalar;
+
+/// The distribution that hidden weights and biases are drawn from, before scaling.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Distribution {
+    /// Uniform on $[-1, 1)$, the usual choice of the ELM literature.
+    #[default]
+    Uniform,
+    /// Normal with mean 0 and variance 1.
+    Normal,
+}
+
+impl Distribution {
+    /// The name, as it is written in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Uniform => "uniform",
+            Self::Normal => "normal",
+        }
+    }
+}
+
+/// Where the biases of the random layer come from.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Biases {
+    /// Drawn as the weights are, and multiplied by the same scale.
+    #[default]
+    AsWeights,
+    /// Drawn as the weights are, and multiplied by a scale of their own.
+    Scaled(f64),
+    /// Chosen so that each neuron's weighted sum is 0 at a training row drawn for it: the bend or
+    /// bump of every neuron then lies where there are data, whatever the scale of the weights.
+    OnData,
+}
+
+/// What a neuron's function is applied to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Kind {
+    /// A weighted sum of the inputs and a bias, $\omega_k \cdot x + b_k$: the neurons of equation 7.
+    #[default]
+    Projection,
+    /// The distance $\lVert s \odot (x - c_k) \rVert$ from a centre, a training row drawn for the
+    /// neuron (no row twice until all are taken), with each input multiplied by the scale of the
+    /// weights, $s$. With [`Activation::Gaussian`] this is a radial basis function
+    /// $e^{-\lVert s \odot (x - c_k) \rVert^2}$, whose width is the scale's inverse.
+    Radial,
+}
+
+/// Neurons of one kind, to stand in one layer with others: see
+/// [`ElmParams::and`](crate::ElmParams::and).
+///
+/// ```
+/// use elm::{Activation, Biases, ElmParams, Neurons};
+/// use ndarray::{Array1, Axis};
+///
+/// let x = Array1::linspace(-3.0, 3.0, 100).insert_axis(Axis(1));
+/// let params = ElmParams::new(20)
+///     .activation(Activation::Tanh)
+///     .and(Neurons::new(10, Activation::Sine).scale(3.0).biases(Biases::OnData))
+///     .and(Neurons::radial(10));
+/// let model = params.fit(&x, &x.mapv(|x: f64| x.abs()))?;
+/// assert_eq!(model.hidden().neurons(), 40);
+/// # Ok::<(), elm::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Neurons<A: Scalar> {
+    pub(crate) count: usize,
+    pub(crate) activation: Activation<A>,
+    pub(crate) kind: Kind,
+    pub(crate) scale: f64,
+    pub(crate) biases: Biases,
+}
+
+impl<A: Scalar> Neurons<A> {
+    /// This many neurons of equation 7.
+    #[must_use]
+    pub fn new(count: usize, activation: Activation<A>) -> Self {
+        Self {
+            count,
+            activation,
+            kind: Kind::Projection,
+            scale: 1.0,
+            biases: Biases::default(),
+        }
+    }
+
+    /// This many Gaussian radial basis functions.
+    #[must_use]
+    pub fn radial(count: usize) -> Self {
+        Self {
+            kind: Kind::Radial,
+            ..Self::new(count, Activation::Gaussian)
+        }
+    }
+
+    /// What the function is applied to.
+    #[must_use]
+    pub fn kind(mut self, kind: Kind) -> Self {
+        self.kind = kind;
+        self
+    }
+
+    /// Multiplies the weights on top of [`ElmParams::scale`](crate::ElmParams::scale): how many
+    /// times the scale of the layer these neurons have. 1 unless set.
+    #[must_use]
+    pub fn scale(mut self, scale: f64) -> Self {
+        self.scale = scale;
+        self
+    }
+
+    /// Where the biases come from; radial neurons have none.
+    #[must_use]
+    pub fn biases(mut self, biases: Biases) -> Self {
+        self.biases = biases;
+        self
+    }
+
+    /// Whether drawing takes more of the rows than the number of their inputs.
+    pub(crate) fn need_rows(&self) -> bool {
+        self.kind == Kind::Radial || self.biases == Biases::OnData
+    }
+}
+
+/// How a layer is drawn.
+#[derive(Debug, Clone)]
+pub(crate) struct Plan<A: Scalar> {
+    pub(crate) groups: Vec<Neurons<A>>,
+    pub(crate) distribution: Distribution,
+    /// Multiplies all weights.
+    pub(crate) scale: f64,
+    /// Multiplies the weights of each input; 1 for an input that is not listed.
+    pub(crate) input_scales: Vec<f64>,
+    pub(crate) seed: u64,
+}
+
+/// Of the streams of random numbers that a group has, apart from those of other groups.
+const STREAMS: u64 = 4;
+/// The weights of a group.
+const WEIGHTS: u64 = 0;
+/// The rows that biases or centres are laid on: a stream of its own, so that the weights are those
+/// of the other choices.
+const ROWS: u64 = 2;
+
+impl<A: Scalar> Plan<A> {
+    /// Draws a layer for these (standardised) training rows.
+    pub(crate) fn draw(&self, x: ArrayView2<'_, A>) -> HiddenLayer<A> {
+        let neurons = self.groups.iter().map(|group| group.count).sum();
+        let mut layer = HiddenLayer {
+            weights: Array2::zeros((x.ncols(), neurons)),
+            biases: Array1::zeros(neurons),
+            groups: Vec::new(),
+        };
+        let mut first = 0;
+        for (stream, group) in (0..).step_by(STREAMS as usize).zip(&self.groups) {
+            let columns = first..first + group.count;
+            first = columns.end;
+            if columns.is_empty() {
+                continue;
+            }
+            let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+            random.set_stream(stream + WEIGHTS);
+            let (weights, biases, radial) = match group.kind {
+                Kind::Projection => {
+                    let (weights, biases) = self.projections(x, group, stream, random);
+                    (weights, biases, None)
+                }
+                Kind::Radial => {
+                    random.set_stream(stream + ROWS);
+                    let (centres, scales) = self.centres(x, group, &mut random);
+                    (centres, Array1::zeros(group.count), Some(scales))
+                }
+            };
+            layer
+                .weights
+                .slice_mut(s![.., columns.clone()])
+                .assign(&weights);
+            layer.biases.slice_mut(s![columns]).assign(&biases);
+            layer.groups.push(Group {
+                neurons: group.count,
+                activation: group.activation.clone(),
+                radial,
+            });
+        }
+        layer
+    }
+
+    fn input_scale(&self, input: usize) -> f64 {
+        self.input_scales.get(input).copied().unwrap_or(1.0)
+    }
+
+    fn projections(
+        &self,
+        x: ArrayView2<'_, A>,
+        group: &Neurons<A>,
+        stream: u64,
+        mut random: ChaCha8Rng,
+    ) -> (Array2<A>, Array1<A>) {
+        let shape = (group.count, x.ncols() + 1);
+        let draws: Array2<f64> = match self.distribution {
+            Distribution::Uniform => Array2::random_using(shape, StandardUniform, &mut random)
+                .mapv_into(|unit: f64| 2.0 * unit - 1.0),
+            Distribution::Normal => Array2::random_using(shape, StandardNormal, &mut random),
+        };
+        let scale = self.scale * group.scale;
+        // Laid out by rows, as the product reads it.
+        let weights = Array2::from_shape_fn((x.ncols(), group.count), |(input, neuron)| {
+            A::from_f64(draws[[neuron, input]] * scale * self.input_scale(input))
+        });
+        let drawn = |scale: f64| draws.column(x.ncols()).mapv(|b| A::from_f64(b * scale));
+        let biases = match group.biases {
+            Biases::AsWeights => drawn(scale),
+            Biases::Scaled(scale) => drawn(scale),
+            Biases::OnData => {
+                random = ChaCha8Rng::seed_from_u64(self.seed);
+                random.set_stream(stream + ROWS);
+                let rows = weights.columns().into_iter().map(|column| {
+                    let row = random.random_range(0..x.nrows().max(1));
+                    -column.dot(&x.row(row))
+                });
+                rows.collect()
+            }
+        };
+        (weights, biases)
+    }
+
+    /// Centres in scaled inputs, shape (inputs, neurons), and the scale of each input.
+    fn centres(
+        &self,
+        x: ArrayView2<'_, A>,
+        group: &Neurons<A>,
+        random: &mut ChaCha8Rng,
+    ) -> (Array2<A>, Array1<A>) {
+        let scales = Array1::from_shape_fn(x.ncols(), |input| {
+            A::from_f64(self.scale * group.scale * self.input_scale(input))
+        });
+        // A shuffle that stops half-way, so that fewer neurons are the beginning of more.
+        let mut rows: Vec<usize> = (0..x.nrows()).collect();
+        let mut centres = Array2::zeros((x.ncols(), group.count));
+        for (neuron, mut centre) in centres.columns_mut().into_iter().enumerate() {
+            let place = neuron % rows.len().max(1);
+            if !rows.is_empty() {
+                let other = random.random_range(place..rows.len());
+                rows.swap(place, other);
+            }
+            if let Some(&row) = rows.get(place) {
+                centre.assign(&(&x.row(row) * &scales));
+            }
+        }
+        (centres, scales)
+    }
+}

@@ -1,0 +1,271 @@
+//! Choosing the scale of the random weights, the number of neurons and the regularisation.
+//!
+//! What decides how good an extreme learning machine is, is the scale of its random weights: too
+//! small and every neuron is a straight line, too large and every neuron is a step. It cannot be
+//! had from a formula, but it can be had from held-out errors, which cost one factorisation each
+//! (see [`validate`](crate::validate)). A [`Tuner`] searches within a budget of them:
+//!
+//! 1. a coarse grid of scales, a factor of $\sqrt{10}$ apart, then smaller and smaller steps, with the
+//!    neurons given or a hundred;
+//! 2. if wanted, a scale for each input: all at once, in proportion to the slopes that the network
+//!    found so far has along them (as in recursive feature machines: Radhakrishnan, Beaglehole,
+//!    Pandit and Belkin, Science 383, 2024), a few times over, so that inputs that do not matter
+//!    shrink however many they are; then one after the other, while the budget lasts;
+//! 3. unless it is given, the number of neurons: doubled as long as that pays, and the scale once
+//!    more.
+//!
+//! In 2 and 3, where a search could follow noise, a step pays only if the held-out errors fall by
+//! more than one standard error of their difference, row by row.
+//!
+//! The regularisation is chosen by leave-one-out within each trial. Every trial, and with it the
+//! way to the choice, is in [`Tuned::trials`]. Because the error of the winner was used to choose
+//! it, it is a little too good; judge the model on rows that the tuner has not seen.
+//!
+//! ```
+//! use elm::ElmParams;
+//! use ndarray::{Array1, Axis};
+//!
+//! let x = Array1::linspace(-10.0, 10.0, 200).insert_axis(Axis(1));
+//! let t = x.mapv(|x: f64| x.sin() / x);
+//! let tuned = ElmParams::auto().tune(&x, &t)?;
+//! println!("{} neurons, scale {:.2}", tuned.best.neurons, tuned.best.scale);
+//! assert!(tuned.best.score < 1e-3);
+//! let y = tuned.model.predict(&x)?;
+//! # assert_eq!(y.dim(), (200, 1));
+//! # Ok::<(), elm::Error>(())
+//! ```
+
+mod search;
+
+use ndarray::ArrayRef2;
+use serde::{Deserialize, Serialize};
+
+use crate::activation::Activation;
+use crate::error::{Error, Result};
+use crate::hidden::Biases;
+use crate::model::{ElmParams, Targets};
+use crate::network::Elm;
+use crate::scalar::Scalar;
+use crate::solve::{Ridge, check_length, check_matrix};
+use search::Search;
+
+/// The held-out error that a [`Tuner`] makes small.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Criterion {
+    /// Exact leave-one-out.
+    #[default]
+    LeaveOneOut,
+    /// Exact k-fold with this many folds: less optimistic where neighbouring rows are near-copies
+    /// of each other.
+    KFold(usize),
+}
+
+/// One setting that was tried.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Trial {
+    /// Number of hidden neurons.
+    pub neurons: usize,
+    /// Scale of the random weights.
+    pub scale: f64,
+    /// Scale of each input on top of it; empty where all are 1.
+    pub input_scales: Vec<f64>,
+    /// Held-out RMSE relative to the targets' standard deviation, root mean square over outputs.
+    pub score: f64,
+}
+
+/// What a [`Tuner`] found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tuned<A: Scalar> {
+    /// The network with the best setting, fitted to all rows.
+    pub model: Elm<A>,
+    /// The settings of that network, to fit others alike.
+    pub params: ElmParams<A>,
+    /// The best trial.
+    pub best: Trial,
+    /// All trials in the order they were made.
+    pub trials: Vec<Trial>,
+}
+
+/// Chooses settings by held-out errors; made by [`ElmParams::auto`] or [`ElmParams::tuner`].
+///
+/// # Parameters
+///
+/// | name | default | purpose | range |
+/// |---|---|---|---|
+/// | [`budget`](Self::budget) | 24; 60 for `auto` | factorisations to spend on the search | at least 1 |
+/// | [`criterion`](Self::criterion) | leave-one-out | the error that is made small | at least 2 folds |
+/// | [`max_neurons`](Self::max_neurons) | 1000; fewer above 4000 rows | where doubling ends when the number is not given | at least 1 |
+/// | [`search_rows`](Self::search_rows) | 2000 | rows that the search looks at, drawn at random | at least 2 |
+/// | [`per_input`](Self::per_input) | off; on for `auto` | whether each input gets a scale of its own | |
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tuner<A: Scalar> {
+    base: ElmParams<A>,
+    /// `None` to choose.
+    neurons: Option<usize>,
+    budget: usize,
+    criterion: Criterion,
+    /// `None` for a number by the rows.
+    max_neurons: Option<usize>,
+    search_rows: usize,
+    per_input: bool,
+}
+
+impl<A: Scalar> ElmParams<A> {
+    /// Chooses everything: neurons, weight scale, a scale per input and regularisation, for tanh
+    /// neurons with their biases on the data, within 60 factorisations.
+    #[must_use]
+    pub fn auto() -> Tuner<A> {
+        let base = Self::new(1)
+            .activation(Activation::Tanh)
+            .biases(Biases::OnData);
+        Tuner {
+            neurons: None,
+            per_input: true,
+            budget: 60,
+            ..base.tuner()
+        }
+    }
+
+    /// Chooses weight scale and regularisation, and keeps all other settings.
+    #[must_use]
+    pub fn tuner(self) -> Tuner<A> {
+        Tuner {
+            neurons: Some(self.neurons()),
+            base: self,
+            budget: 24,
+            criterion: Criterion::default(),
+            max_neurons: None,
+            search_rows: 2000,
+            per_input: false,
+        }
+    }
+}
+
+impl<A: Scalar> Tuner<A> {
+    /// How many factorisations the search may spend; the final fit comes on top.
+    #[must_use]
+    pub fn budget(mut self, factorisations: usize) -> Self {
+        self.budget = factorisations;
+        self
+    }
+
+    /// The held-out error that is made small.
+    #[must_use]
+    pub fn criterion(mut self, criterion: Criterion) -> Self {
+        self.criterion = criterion;
+        self
+    }
+
+    /// The largest number of neurons that is chosen. Unless it is set, 1000; or, where there are more
+    /// than 4000 rows, as many as keep rows times neurons squared, which the final fit's time goes
+    /// by, at 4e9, but at least 200.
+    #[must_use]
+    pub fn max_neurons(mut self, neurons: usize) -> Self {
+        self.max_neurons = Some(neurons);
+        self
+    }
+
+    /// How many rows the search looks at. The final fit uses all.
+    #[must_use]
+    pub fn search_rows(mut self, rows: usize) -> Self {
+        self.search_rows = rows;
+        self
+    }
+
+    /// Whether each input gets a scale of its own.
+    #[must_use]
+    pub fn per_input(mut self, per_input: bool) -> Self {
+        self.per_input = per_input;
+        self
+    }
+
+    /// Seeds the random layer, and the choice of rows and folds for the search.
+    #[must_use]
+    pub fn seed(mut self, seed: u64) -> Self {
+        self.base = self.base.seed(seed);
+        self
+    }
+
+    /// Searches, and fits the best setting to all rows: [`tune`](Self::tune) without the path.
+    ///
+    /// # Errors
+    /// Those of [`tune`](Self::tune).
+    pub fn fit<T: Targets<A>>(&self, x: &ArrayRef2<A>, t: &T) -> Result<Elm<A>> {
+        Ok(self.tune(x, t)?.model)
+    }
+
+    /// Searches, and fits the best setting to all rows.
+    ///
+    /// `x` has shape (rows, inputs); `t` has shape (rows, outputs), or (rows) for one output.
+    /// Whatever solver was set, ridge by leave-one-out is used.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a setting out of range, and those of [`CheckedParams::fit`].
+    ///
+    /// [`CheckedParams::fit`]: crate::CheckedParams::fit
+    pub fn tune<T: Targets<A>>(&self, x: &ArrayRef2<A>, t: &T) -> Result<Tuned<A>> {
+        self.check()?;
+        let (x, t) = (x.view(), t.as_matrix());
+        check_matrix("inputs", x)?;
+        check_matrix("targets", t)?;
+        check_length("rows of targets", t.nrows(), x.nrows())?;
+        let mut search = Search::new(self, x, t)?;
+        search.run()?;
+        let (best, trials) = search.finish()?;
+        let params = self.params(&best);
+        let model = params.fit(&x, &t)?;
+        Ok(Tuned {
+            model,
+            params,
+            best,
+            trials,
+        })
+    }
+
+    /// Where doubling ends for a problem of this many rows.
+    fn most_neurons(&self, rows: usize) -> usize {
+        const WORK: f64 = 4e9;
+        let affordable = || (WORK / rows as f64).sqrt().clamp(200.0, 1000.0) as usize;
+        self.max_neurons.unwrap_or_else(affordable)
+    }
+
+    fn check(&self) -> Result<()> {
+        let parameter = |name, value: usize, expected| {
+            Err(Error::Parameter {
+                name,
+                value: value as f64,
+                expected,
+            })
+        };
+        match self {
+            Self { budget: 0, .. } => parameter("budget", 0, "at least 1"),
+            Self {
+                max_neurons: Some(0),
+                ..
+            } => parameter("max_neurons", 0, "at least 1"),
+            Self {
+                search_rows: rows @ (0 | 1),
+                ..
+            } => parameter("search_rows", *rows, "at least 2"),
+            Self {
+                criterion: Criterion::KFold(folds @ (0 | 1)),
+                ..
+            } => parameter("folds", *folds, "at least 2"),
+            Self {
+                neurons: Some(0), ..
+            } => parameter("neurons", 0, "at least 1"),
+            _ => Ok(()),
+        }
+    }
+
+    fn params(&self, trial: &Trial) -> ElmParams<A> {
+        self.base
+            .clone()
+            .with_neurons(trial.neurons)
+            .scale(trial.scale)
+            .input_scales(trial.input_scales.clone())
+            .solver(Ridge::leave_one_out())
+    }
+}

@@ -1,0 +1,392 @@
+//! The search itself: trials, and where to go from them.
+
+use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
+use rand::SeedableRng;
+use rand::seq::index;
+use rand_chacha::ChaCha8Rng;
+
+use super::{Criterion, Trial, Tuner};
+use crate::error::{Error, Result};
+use crate::scalar::Scalar;
+use crate::solve::Ridge;
+use crate::validate::assign_folds;
+
+/// Neurons that the search uses as long as their number is not chosen.
+const MODERATE: usize = 100;
+/// Relative gain below which more neurons, or another scale for an input, do not pay.
+const WORTHWHILE: f64 = 0.01;
+/// Coarse steps of the scale: half a decade.
+const COARSE: f64 = 0.5;
+/// Steps of the scale below this (in decades) make no difference worth a factorisation.
+const FINEST: f64 = 0.1;
+/// Factorisations that are kept for choosing the number of neurons, where that is to be chosen.
+const FOR_NEURONS: usize = 9;
+/// The smallest scale of an input relative to the largest when slopes decide.
+const LEAST_RELEVANCE: f64 = 0.01;
+/// Rows at which slopes are taken.
+const SLOPE_ROWS: usize = 500;
+
+/// A trial, with the held-out error of each row.
+struct Attempt {
+    trial: Trial,
+    /// Squared, relative to each output's variance, mean over outputs.
+    squares: Vec<f64>,
+}
+
+impl Attempt {
+    /// Whether the errors are smaller by more than one standard error of the difference.
+    fn beats(&self, other: &Self) -> bool {
+        if self.trial.score >= other.trial.score * (1.0 - WORTHWHILE) {
+            return false;
+        }
+        let gains = || {
+            other
+                .squares
+                .iter()
+                .zip(&self.squares)
+                .map(|(old, new)| old - new)
+        };
+        let rows = self.squares.len() as f64;
+        let mean = gains().sum::<f64>() / rows;
+        let variance = gains().map(|gain| (gain - mean).powi(2)).sum::<f64>() / rows;
+        mean > (variance / rows).sqrt()
+    }
+}
+
+/// A search under way.
+pub(super) struct Search<'a, A: Scalar> {
+    tuner: &'a Tuner<A>,
+    x: Array2<A>,
+    t: Array2<A>,
+    /// Standard deviation of each output, 1 for a constant one.
+    spread: Vec<f64>,
+    folds: Option<Vec<usize>>,
+    attempts: Vec<Attempt>,
+    /// Index of the setting that the search stands at.
+    current: usize,
+    /// Bounds of the scale's exponent: beyond, every neuron is a straight line or a step.
+    exponents: (f64, f64),
+    /// Factorisations so far, and how many there may be for now.
+    spent: usize,
+    limit: usize,
+    /// Where doubling ends.
+    most: usize,
+}
+
+impl<'a, A: Scalar> Search<'a, A> {
+    pub(super) fn new(
+        tuner: &'a Tuner<A>,
+        x: ArrayView2<'_, A>,
+        t: ArrayView2<'_, A>,
+    ) -> Result<Self> {
+        let most = tuner.most_neurons(x.nrows());
+        let rows = tuner.search_rows.min(x.nrows());
+        let (x, t) = if rows < x.nrows() {
+            let mut random = ChaCha8Rng::seed_from_u64(tuner.base.get_seed());
+            random.set_stream(3);
+            let mut chosen = index::sample(&mut random, x.nrows(), rows).into_vec();
+            chosen.sort_unstable();
+            (x.select(Axis(0), &chosen), t.select(Axis(0), &chosen))
+        } else {
+            (x.to_owned(), t.to_owned())
+        };
+        let folds = match tuner.criterion {
+            Criterion::LeaveOneOut => None,
+            Criterion::KFold(folds) => Some(assign_folds(rows, folds, tuner.base.get_seed())?),
+        };
+        // A weighted sum of standardised inputs has a deviation of about 1 at this scale.
+        let centre = -(x.ncols() as f64).log10() / 2.0;
+        Ok(Self {
+            tuner,
+            spread: t.columns().into_iter().map(deviation).collect(),
+            x,
+            t,
+            folds,
+            attempts: Vec::new(),
+            current: 0,
+            exponents: (centre - 3.0 * COARSE, centre + 3.0 * COARSE),
+            spent: 0,
+            limit: tuner.budget,
+            most,
+        })
+    }
+
+    /// The best trial, and all.
+    pub(super) fn finish(self) -> Result<(Trial, Vec<Trial>)> {
+        let trials: Vec<Trial> = self.attempts.into_iter().map(|a| a.trial).collect();
+        let best = trials.get(self.current).cloned();
+        let best = best.ok_or(Error::NoConvergence {
+            what: "the search for a weight scale",
+        })?;
+        Ok((best, trials))
+    }
+
+    pub(super) fn run(&mut self) -> Result<()> {
+        let budget = self.tuner.budget;
+        let most = self.most;
+        let neurons = self.tuner.neurons.unwrap_or(MODERATE.min(most));
+        if self.tuner.neurons.is_none() {
+            self.limit = budget - FOR_NEURONS.min(budget / 4);
+        }
+        let centre = (self.exponents.0 + self.exponents.1) / 2.0;
+        // From the middle outwards, so that a small budget is spent well.
+        for step in [0, 1, -1, 2, -2, 3, -3] {
+            let exponent = centre + COARSE * f64::from(step);
+            self.move_if(neurons, exponent, &[], lower)?;
+        }
+        self.refine_scale(COARSE / 2.0)?;
+        if self.tuner.per_input && self.x.ncols() > 1 {
+            self.follow_slopes()?;
+            self.choose_input_scales()?;
+        }
+        self.limit = budget;
+        if self.tuner.neurons.is_none() {
+            self.choose_neurons(most)?;
+        }
+        Ok(())
+    }
+
+    /// Doubles as long as that pays; once it does not, looks one doubling further.
+    fn choose_neurons(&mut self, most: usize) -> Result<()> {
+        let Some(start) = self.now() else {
+            return Ok(());
+        };
+        let (mut neurons, mut misses) = (start.neurons, 0);
+        while neurons < most && misses < 2 {
+            neurons = (2 * neurons).min(most);
+            let exponent = start.scale.log10();
+            if self.move_if(neurons, exponent, &start.input_scales, Attempt::beats)? {
+                misses = 0;
+            } else {
+                misses += 1;
+            }
+        }
+        if self.now().is_some_and(|now| now.neurons != start.neurons) {
+            // More neurons can carry steeper ones.
+            self.refine_scale(COARSE / 2.0)?;
+        }
+        Ok(())
+    }
+
+    /// Scales inputs by the slopes that the network has along them, and again, as long as that pays.
+    fn follow_slopes(&mut self) -> Result<()> {
+        const ROUNDS: usize = 4;
+        for _ in 0..ROUNDS {
+            let Some(now) = self.now().filter(|_| !self.is_spent()) else {
+                break;
+            };
+            let Some(slopes) = self.slopes(&now)? else {
+                break;
+            };
+            let mut moved = false;
+            for power in [1.0, 0.5] {
+                let scales = proportional(&slopes, power);
+                let exponent = now.scale.log10();
+                moved |= self.move_if(now.neurons, exponent, &scales, Attempt::beats)?;
+            }
+            if !moved {
+                break;
+            }
+            self.refine_scale(COARSE / 2.0)?;
+        }
+        Ok(())
+    }
+
+    /// For each input the root mean square slope of the trial's network along it, in what the network
+    /// makes of the input; nothing where there are none.
+    fn slopes(&mut self, trial: &Trial) -> Result<Option<Vec<f64>>> {
+        // A quarter of a deviation: what matters at the scale of the data, not of the wiggles.
+        const STEP: f64 = 0.25;
+        self.spent += 1;
+        let model = self.tuner.params(trial).fit(&self.x, &self.t)?;
+        let every = self.x.nrows().div_ceil(SLOPE_ROWS).max(1);
+        let rows = self.x.slice(ndarray::s![..;every, ..]).to_owned();
+        let standardises = model.scaler().is_some();
+        let mut slopes = Vec::with_capacity(self.x.ncols());
+        for (input, column) in self.x.columns().into_iter().enumerate() {
+            let unit = deviation(column);
+            let moved = |by: f64| {
+                let mut rows = rows.clone();
+                rows.column_mut(input)
+                    .mapv_inplace(|x| x + A::from_f64(by * unit));
+                model.predict(&rows)
+            };
+            let (Ok(up), Ok(down)) = (moved(STEP), moved(-STEP)) else {
+                // Beyond the range of the type.
+                return Ok(None);
+            };
+            let mut squares = 0.0;
+            for (change, spread) in (up - down).columns().into_iter().zip(&self.spread) {
+                squares += change
+                    .iter()
+                    .map(|c| (c.as_f64() / spread).powi(2))
+                    .sum::<f64>();
+            }
+            slopes.push(squares.sqrt() / if standardises { 1.0 } else { unit });
+        }
+        let usable = slopes.iter().all(|s| s.is_finite()) && slopes.iter().any(|s| *s > 0.0);
+        Ok(usable.then_some(slopes))
+    }
+
+    fn refine_scale(&mut self, mut step: f64) -> Result<()> {
+        while step >= FINEST && !self.is_spent() {
+            let mut moved = false;
+            for direction in [1.0, -1.0] {
+                let Some(now) = self.now() else {
+                    return Ok(());
+                };
+                let exponent = now.scale.log10() + direction * step;
+                if exponent < self.exponents.0 || exponent > self.exponents.1 {
+                    continue;
+                }
+                if self.move_if(now.neurons, exponent, &now.input_scales, lower)? {
+                    moved = true;
+                    break;
+                }
+            }
+            if !moved {
+                step /= 2.0;
+            }
+        }
+        Ok(())
+    }
+
+    /// Coordinate by coordinate, by a factor that shrinks once no input moves.
+    fn choose_input_scales(&mut self) -> Result<()> {
+        let mut step = 2.0 * COARSE;
+        while step >= FINEST && !self.is_spent() {
+            let mut moved = false;
+            for input in 0..self.x.ncols() {
+                for direction in [-1.0, 1.0] {
+                    let Some(now) = self.now() else {
+                        return Ok(());
+                    };
+                    let mut scales = now.input_scales.clone();
+                    scales.resize(self.x.ncols(), 1.0);
+                    scales[input] *= 10.0_f64.powf(direction * step);
+                    let exponent = now.scale.log10();
+                    if self.move_if(now.neurons, exponent, &scales, Attempt::beats)? {
+                        moved = true;
+                        break;
+                    }
+                }
+            }
+            if !moved {
+                step /= 2.0;
+            }
+        }
+        Ok(())
+    }
+
+    fn is_spent(&self) -> bool {
+        self.spent >= self.limit
+    }
+
+    /// Where the search stands.
+    fn now(&self) -> Option<Trial> {
+        self.current().map(|attempt| attempt.trial.clone())
+    }
+
+    fn current(&self) -> Option<&Attempt> {
+        self.attempts.get(self.current)
+    }
+
+    /// Tries a setting, records it, and moves there if it is better than where the search stands;
+    /// returns whether it moved. Does nothing once the budget is spent.
+    fn move_if(
+        &mut self,
+        neurons: usize,
+        exponent: f64,
+        scales: &[f64],
+        better: impl Fn(&Attempt, &Attempt) -> bool,
+    ) -> Result<bool> {
+        if self.is_spent() {
+            return Ok(false);
+        }
+        self.spent += 1;
+        let scale = 10.0_f64.powf(exponent);
+        let attempt = self.attempt(neurons, scale, scales)?;
+        let moves = self
+            .current()
+            .is_none_or(|current| better(&attempt, current));
+        if moves {
+            self.current = self.attempts.len();
+        }
+        self.attempts.push(attempt);
+        Ok(moves)
+    }
+
+    fn attempt(&self, neurons: usize, scale: f64, scales: &[f64]) -> Result<Attempt> {
+        let mut trial = Trial {
+            neurons,
+            scale,
+            input_scales: scales.to_vec(),
+            score: f64::INFINITY,
+        };
+        let params = self.tuner.params(&trial).check()?;
+        let validator = params.validator(self.x.view(), self.t.view())?;
+        let lambda = validator.strengths(Ridge::leave_one_out())?;
+        let held_out = match &self.folds {
+            Some(folds) => validator.k_fold(folds, &lambda),
+            None => validator.leave_one_out(&lambda),
+        };
+        let held_out = match held_out {
+            Ok(held_out) => held_out,
+            // A row or fold that cannot be left out, as of a single one: any setting is as good.
+            Err(Error::Undetermined { .. }) => {
+                return Ok(Attempt {
+                    trial,
+                    squares: Vec::new(),
+                });
+            }
+            Err(error) => return Err(error),
+        };
+        let outputs = self.spread.len() as f64;
+        let squares: Vec<f64> = held_out
+            .residuals()
+            .rows()
+            .into_iter()
+            .map(|row| {
+                let relative = row
+                    .iter()
+                    .zip(&self.spread)
+                    .map(|(e, s)| (e.as_f64() / s).powi(2));
+                relative.sum::<f64>() / outputs
+            })
+            .collect();
+        trial.score = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        Ok(Attempt { trial, squares })
+    }
+}
+
+fn lower(new: &Attempt, old: &Attempt) -> bool {
+    new.trial.score < old.trial.score
+}
+
+/// Scales in proportion to a power of the slopes, so that a weighted sum keeps its size.
+fn proportional(slopes: &[f64], power: f64) -> Vec<f64> {
+    let largest = slopes.iter().copied().fold(0.0, f64::max);
+    let relative = slopes
+        .iter()
+        .map(|s| (s / largest).max(LEAST_RELEVANCE).powf(power));
+    let relative: Vec<f64> = relative.collect();
+    let mean_square = relative.iter().map(|s| s * s).sum::<f64>() / relative.len() as f64;
+    relative.iter().map(|s| s / mean_square.sqrt()).collect()
+}
+
+/// The standard deviation, or 1 where it is 0.
+fn deviation<A: Scalar>(column: ArrayView1<'_, A>) -> f64 {
+    let values: Vec<f64> = column.iter().map(|value| value.as_f64()).collect();
+    let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    if largest == 0.0 {
+        return 1.0;
+    }
+    let count = values.len() as f64;
+    let mean = values.iter().map(|v| v / largest).sum::<f64>() / count;
+    let squares = values
+        .iter()
+        .map(|v| (v / largest - mean).powi(2))
+        .sum::<f64>();
+    let deviation = (squares / count).sqrt() * largest;
+    if deviation > 0.0 { deviation } else { 1.0 }
+}
