@@ -30,7 +30,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(arguments: impl Iterator<Item = String>) -> Result<String, Box<dyn Error>> {
+pub(crate) fn run(arguments: impl Iterator<Item = String>) -> Result<String, Box<dyn Error>> {
     let (train, test, target) = parse(arguments)?;
     let table = Table::read(&train)?;
     let (x, t) = table.split_target(&[&target])?;

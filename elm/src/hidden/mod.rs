@@ -112,7 +112,7 @@ impl<A: Scalar> HiddenLayer<A> {
         let blocks = x.axis_chunks_iter(Axis(0), BLOCK);
         for (x, mut to) in blocks.zip(to.axis_chunks_iter_mut(Axis(0), BLOCK)) {
             let mut z = match &group.radial {
-                None => A::product(x, weights) + &biases,
+                None => A::product(x, weights) + biases,
                 Some(scales) => distance::distances((&x * scales).view(), weights),
             };
             group.activation.apply_in_place(z.view_mut());
@@ -145,7 +145,9 @@ impl<A: Scalar> HiddenLayer<A> {
     /// of its neurons, in which layer it was and its number there. The layers must have the same
     /// inputs.
     pub(crate) fn join(layers: &[&Self]) -> (Self, Vec<(usize, usize)>) {
-        let mut groups: Vec<(Group<A>, Vec<(usize, usize)>)> = Vec::new();
+        let mut groups: Vec<Group<A>> = Vec::new();
+        // Of each of these groups where its neurons come from.
+        let mut order: Vec<Vec<(usize, usize)>> = Vec::new();
         for (place, layer) in layers.iter().enumerate() {
             let mut first = 0;
             for group in &layer.groups {
@@ -154,16 +156,15 @@ impl<A: Scalar> HiddenLayer<A> {
                 let alike = |known: &Group<A>| {
                     known.activation == group.activation && known.radial == group.radial
                 };
-                match groups.iter_mut().find(|(known, _)| alike(known)) {
-                    Some((known, neurons)) => {
-                        known.neurons += group.neurons;
-                        neurons.extend(own);
-                    }
-                    None => groups.push((group.clone(), own.collect())),
+                if let Some(known) = groups.iter().position(alike) {
+                    groups[known].neurons += group.neurons;
+                    order[known].extend(own);
+                } else {
+                    groups.push(group.clone());
+                    order.push(own.collect());
                 }
             }
         }
-        let (groups, order): (Vec<_>, Vec<_>) = groups.into_iter().unzip();
         let order = order.concat();
         let inputs = layers.first().map_or(0, |layer| layer.inputs());
         let mut weights = Array2::zeros((inputs, order.len()));
