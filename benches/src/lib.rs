@@ -1,6 +1,7 @@
 //! Benchmarks of `elm` and `elm-brdf`: see `benches/` for the criterion benches, `src/bin/` for
 //! the programs that write the tables of `docs/`.
 
+pub mod auto;
 pub mod networks;
 pub mod peaks;
 pub mod stress;

@@ -170,3 +170,56 @@ fn bad_settings_are_named() {
         }
     ));
 }
+
+/// RMSE on test rows of the best of a grid of scales and strengths, chosen with the test rows in
+/// sight, for 200 neurons like those of `auto` but with one scale for all inputs.
+fn best_of_grid(
+    params: &ElmParams<f64>,
+    (x, t): &(Array2<f64>, Array1<f64>),
+    test: &(Array2<f64>, Array1<f64>),
+) -> f64 {
+    let centre = (x.ncols() as f64).sqrt().recip();
+    let mut best = f64::INFINITY;
+    for step in -4..=4 {
+        let params = params
+            .clone()
+            .scale(centre * 10.0_f64.powf(f64::from(step) / 3.0));
+        for strength in -7..=0 {
+            let ridge = elm::solve::Ridge::relative(10.0_f64.powi(strength));
+            let model = params.clone().solver(ridge).fit(x, t).unwrap();
+            best = best.min(rmse(&model, test));
+        }
+    }
+    best
+}
+
+#[test]
+fn on_the_toy_problems_auto_and_the_tuner_are_within_a_tenth_of_the_best_of_a_dense_grid() {
+    use elm_datasets::toy;
+    type Draw = fn(usize, f64, u64) -> Result<toy::Toy, elm_datasets::Error>;
+    let problems: [(&str, Draw, f64); 4] = [
+        ("sinc", toy::sinc, 0.1),
+        ("Friedman 1", toy::friedman1, 1.0),
+        ("Friedman 2", toy::friedman2, 125.0),
+        ("Friedman 3", toy::friedman3, 0.1),
+    ];
+    for (seed, (name, draw, noise)) in (1..).zip(problems) {
+        let data = |rows, seed| {
+            let toy = draw(rows, noise, seed).unwrap();
+            (toy.inputs, toy.targets.column(0).to_owned())
+        };
+        let (train, test) = (data(300, seed), data(1000, seed + 1000));
+        let given = ElmParams::new(200)
+            .activation(Activation::Tanh)
+            .biases(elm::Biases::OnData)
+            .seed(seed);
+        let best = best_of_grid(&given, &train, &test);
+        for (subject, tuner) in [
+            ("auto", ElmParams::auto().seed(seed)),
+            ("tuner", given.tuner()),
+        ] {
+            let ratio = rmse(&tuner.fit(&train.0, &train.1).unwrap(), &test) / best;
+            assert!(ratio <= 1.1, "{subject}, {name}: {ratio}");
+        }
+    }
+}

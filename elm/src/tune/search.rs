@@ -34,8 +34,8 @@ struct Attempt {
 }
 
 impl Attempt {
-    /// Whether the errors are smaller by more than one standard error of the difference.
-    fn beats(&self, other: &Self) -> bool {
+    /// Whether the errors are smaller by more than so many standard errors of the difference.
+    fn beats(&self, other: &Self, standard_errors: f64) -> bool {
         if self.trial.score >= other.trial.score * (1.0 - WORTHWHILE) {
             return false;
         }
@@ -49,7 +49,7 @@ impl Attempt {
         let rows = self.squares.len() as f64;
         let mean = gains().sum::<f64>() / rows;
         let variance = gains().map(|gain| (gain - mean).powi(2)).sum::<f64>() / rows;
-        mean > (variance / rows).sqrt()
+        mean > standard_errors * (variance / rows).sqrt()
     }
 }
 
@@ -132,9 +132,9 @@ impl<'a, A: Scalar> Search<'a, A> {
         // From the middle outwards, so that a small budget is spent well.
         for step in [0, 1, -1, 2, -2, 3, -3] {
             let exponent = centre + COARSE * f64::from(step);
-            self.move_if(neurons, exponent, &[], lower)?;
+            self.move_if(neurons, exponent, &[], scale_pays)?;
         }
-        self.refine_scale(COARSE / 2.0)?;
+        self.refine_scale(COARSE / 2.0, FINEST)?;
         if self.tuner.per_input && self.x.ncols() > 1 {
             self.follow_slopes()?;
             self.choose_input_scales()?;
@@ -153,17 +153,21 @@ impl<'a, A: Scalar> Search<'a, A> {
         };
         let (mut neurons, mut misses) = (start.neurons, 0);
         while neurons < most && misses < 2 {
+            // What is left to the most is not worth a step of its own unless it is half as many again.
+            if 3 * neurons > 2 * most {
+                break;
+            }
             neurons = (2 * neurons).min(most);
             let exponent = start.scale.log10();
-            if self.move_if(neurons, exponent, &start.input_scales, Attempt::beats)? {
+            if self.move_if(neurons, exponent, &start.input_scales, neurons_pay)? {
                 misses = 0;
             } else {
                 misses += 1;
             }
         }
         if self.now().is_some_and(|now| now.neurons != start.neurons) {
-            // More neurons can carry steeper ones.
-            self.refine_scale(COARSE / 2.0)?;
+            // More neurons can carry steeper ones. No finer: these factorisations are the dear ones.
+            self.refine_scale(COARSE / 2.0, COARSE / 2.0)?;
         }
         Ok(())
     }
@@ -182,12 +186,12 @@ impl<'a, A: Scalar> Search<'a, A> {
             for power in [1.0, 0.5] {
                 let scales = proportional(&slopes, power);
                 let exponent = now.scale.log10();
-                moved |= self.move_if(now.neurons, exponent, &scales, Attempt::beats)?;
+                moved |= self.move_if(now.neurons, exponent, &scales, slopes_pay)?;
             }
             if !moved {
                 break;
             }
-            self.refine_scale(COARSE / 2.0)?;
+            self.refine_scale(COARSE / 2.0, FINEST)?;
         }
         Ok(())
     }
@@ -228,8 +232,8 @@ impl<'a, A: Scalar> Search<'a, A> {
         Ok(usable.then_some(slopes))
     }
 
-    fn refine_scale(&mut self, mut step: f64) -> Result<()> {
-        while step >= FINEST && !self.is_spent() {
+    fn refine_scale(&mut self, mut step: f64, finest: f64) -> Result<()> {
+        while step >= finest && !self.is_spent() {
             let mut moved = false;
             for direction in [1.0, -1.0] {
                 let Some(now) = self.now() else {
@@ -239,7 +243,7 @@ impl<'a, A: Scalar> Search<'a, A> {
                 if exponent < self.exponents.0 || exponent > self.exponents.1 {
                     continue;
                 }
-                if self.move_if(now.neurons, exponent, &now.input_scales, lower)? {
+                if self.move_if(now.neurons, exponent, &now.input_scales, step_pays)? {
                     moved = true;
                     break;
                 }
@@ -265,7 +269,7 @@ impl<'a, A: Scalar> Search<'a, A> {
                     scales.resize(self.x.ncols(), 1.0);
                     scales[input] *= 10.0_f64.powf(direction * step);
                     let exponent = now.scale.log10();
-                    if self.move_if(now.neurons, exponent, &scales, Attempt::beats)? {
+                    if self.move_if(now.neurons, exponent, &scales, input_pays)? {
                         moved = true;
                         break;
                     }
@@ -359,8 +363,28 @@ impl<'a, A: Scalar> Search<'a, A> {
     }
 }
 
-fn lower(new: &Attempt, old: &Attempt) -> bool {
-    new.trial.score < old.trial.score
+/// The search begins at the scale that suits most problems, and leaves it for a reason: small scales
+/// make networks that are nearly polynomials, whose errors at the edge of the data few rows show.
+fn scale_pays(new: &Attempt, old: &Attempt) -> bool {
+    new.beats(old, 1.5)
+}
+
+fn slopes_pay(new: &Attempt, old: &Attempt) -> bool {
+    new.beats(old, 1.0)
+}
+
+fn neurons_pay(new: &Attempt, old: &Attempt) -> bool {
+    new.beats(old, 1.0)
+}
+
+/// Tens of scales of single inputs are tried: the best of so many that change nothing looks better
+/// by two standard errors, and on few rows following it would be following noise.
+fn input_pays(new: &Attempt, old: &Attempt) -> bool {
+    new.beats(old, 2.0)
+}
+
+fn step_pays(new: &Attempt, old: &Attempt) -> bool {
+    new.beats(old, 0.5)
 }
 
 /// Scales in proportion to a power of the slopes, so that a weighted sum keeps its size.
