@@ -4,6 +4,7 @@ use ndarray::{Array2, ArrayView2};
 
 use crate::error::{Error, Result};
 use crate::geometry::Pair;
+use crate::model::BrdfModel;
 
 /// A reflectance model, possibly of several channels, or of several materials side by side.
 ///
@@ -26,6 +27,12 @@ pub trait Brdf: Send + Sync {
     /// Numbers that must be stored to evaluate one channel, the largest where channels differ:
     /// coefficients, scales and measurements kept, but nothing that a seed regenerates.
     fn floats_per_channel(&self) -> usize;
+
+    /// The model itself where it is a network, for what only a network can do, such as
+    /// [being exported](crate::export).
+    fn as_network(&self) -> Option<&BrdfModel> {
+        None
+    }
 }
 
 /// A way to make a [`Brdf`] from measurements.

@@ -21,6 +21,9 @@ pub enum Error {
     #[cfg(feature = "fetch")]
     #[error(transparent)]
     Fetch(#[from] crate::fetch::Error),
+    /// A model could not be exported.
+    #[error(transparent)]
+    Export(#[from] crate::export::ExportError),
     /// A scene could not be read or rendered.
     #[error(transparent)]
     Scene(#[from] crate::render::SceneError),

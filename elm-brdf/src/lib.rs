@@ -33,9 +33,12 @@
 pub mod brdf;
 pub mod cli;
 mod error;
+pub mod export;
 pub mod features;
 #[cfg(feature = "fetch")]
 pub mod fetch;
+mod file;
+pub mod gallery;
 pub mod geometry;
 pub mod link;
 pub mod metrics;

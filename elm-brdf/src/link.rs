@@ -150,7 +150,7 @@ pub struct FittedLink {
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-enum Channel {
+pub(crate) enum Channel {
     Identity,
     Log {
         /// In 1/sr.
@@ -195,6 +195,11 @@ impl FittedLink {
     #[must_use]
     pub fn channels(&self) -> usize {
         self.channels.len()
+    }
+
+    /// The link of each channel.
+    pub(crate) fn by_channel(&self) -> &[Channel] {
+        &self.channels
     }
 
     /// Numbers kept for each channel.

@@ -48,6 +48,18 @@ pub struct BrdfModel {
 }
 
 impl BrdfModel {
+    /// The inputs of the network.
+    #[must_use]
+    pub fn features(&self) -> Features {
+        self.features
+    }
+
+    /// What turns its outputs into BRDF values.
+    #[must_use]
+    pub fn link(&self) -> &FittedLink {
+        &self.link
+    }
+
     /// The fitted network.
     #[must_use]
     pub fn network(&self) -> &Elm<f64> {
@@ -82,6 +94,10 @@ impl Brdf for BrdfModel {
     fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
         let targets = self.network.predict(&self.features.compute(pairs))?;
         self.link.to_values(targets)
+    }
+
+    fn as_network(&self) -> Option<&BrdfModel> {
+        Some(self)
     }
 
     fn floats_per_channel(&self) -> usize {

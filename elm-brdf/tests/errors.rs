@@ -48,6 +48,19 @@ fn bad_usage_is_refused_in_one_line() {
             &["0 folds", "2 to 205"][..],
         ),
         (&["reproduce", "--folds", "1"], &["1 folds", "2 to 205"]),
+        (
+            &["export", "curet:1", "-o", "a.png"],
+            &["a.png", ".glsl", ".binary"],
+        ),
+        (
+            &["export", "curet:1", "-o", "a.c", "--format", "rust"],
+            &["rust", "glsl"],
+        ),
+        (&["gallery"], &["--out"]),
+        (
+            &["gallery", "--out", "a", "--materials", "62"],
+            &["62", "61"],
+        ),
         (&["reproduce", "--folds", "206"], &["206 folds", "2 to 205"]),
         (&["reproduce", "--folds", "-1"], &["--folds"]),
         (&["reproduce", "--neurons", "0"], &["neurons", "at least 1"]),

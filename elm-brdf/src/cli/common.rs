@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 use std::io::{self, IsTerminal};
+use std::path::Path;
 use std::str::FromStr;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -10,6 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::data::{self, Source};
 use super::{Failure, say};
 use crate::error::Error;
+use crate::render::{Library, default_network};
 
 /// Reads one of `names`, and lists them in the help and in the error.
 pub(super) fn one_of<T>(
@@ -24,6 +26,18 @@ where
 /// An error that what was typed is to blame for.
 pub(super) fn usage(error: impl Display) -> Failure {
     Failure::Usage(error.to_string())
+}
+
+/// Where a scene's materials come from.
+pub(super) fn library(named: Option<&Path>) -> Result<Library, Failure> {
+    let curet = match Source::find(named)? {
+        Source::Curet(dir) => Some(dir),
+        Source::Synthetic => None,
+    };
+    Ok(Library {
+        curet,
+        network: Box::new(default_network),
+    })
 }
 
 /// Tells whoever sits at a terminal how to get measurements in place of the stand-in.

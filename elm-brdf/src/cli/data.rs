@@ -74,6 +74,14 @@ impl Source {
         }
     }
 
+    /// What a picture's words call this place.
+    pub(super) fn caption(&self) -> &'static str {
+        match self {
+            Self::Curet(_) => "CUReT",
+            Self::Synthetic => "the synthetic stand-in",
+        }
+    }
+
     /// What a report calls this place.
     pub(super) fn describe(&self) -> String {
         match self {

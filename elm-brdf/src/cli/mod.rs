@@ -4,8 +4,10 @@
 mod common;
 mod compare;
 mod data;
+mod export;
 #[cfg(feature = "fetch")]
 mod fetch;
+mod gallery;
 mod render;
 mod reproduce;
 
@@ -32,6 +34,8 @@ enum Command {
     #[cfg(feature = "fetch")]
     Fetch(fetch::Arguments),
     Render(render::Arguments),
+    Export(export::Arguments),
+    Gallery(gallery::Arguments),
 }
 
 /// Why a command ended without doing its work.
@@ -65,6 +69,8 @@ pub fn run() -> ExitCode {
         Ok(Arguments { command }) => match command {
             Command::Reproduce(arguments) => reproduce::run(&arguments),
             Command::Render(arguments) => render::run(&arguments),
+            Command::Export(arguments) => export::run(&arguments),
+            Command::Gallery(arguments) => gallery::run(&arguments),
             Command::Compare(arguments) => compare::run(&arguments),
             #[cfg(feature = "fetch")]
             Command::Fetch(arguments) => fetch::run(&arguments),

@@ -1,19 +1,17 @@
 //! `elm-brdf render`: a picture of a scene, and the account of the work.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::data::Source;
+use super::common::library;
 use super::{Failure, print, say};
 use crate::error::Error;
+use crate::file;
 use crate::render::scene::Image;
-use crate::render::{
-    Account, Library, Options, Rendering, Savings, Scene, Sheet, builtin, default_network,
-};
+use crate::render::{Account, Options, Rendering, Savings, Scene, Sheet, builtin};
 
 /// Render a scene with learnt materials.
 ///
@@ -131,29 +129,15 @@ impl Arguments {
     }
 }
 
-/// Where a scene's materials come from.
-fn library(named: Option<&Path>) -> Result<Library, Failure> {
-    let curet = match Source::find(named)? {
-        Source::Curet(dir) => Some(dir),
-        Source::Synthetic => None,
-    };
-    Ok(Library {
-        curet,
-        network: Box::new(default_network),
-    })
-}
-
 /// Prints the account and writes it as JSON.
 fn account(path: &Path, account: &Account) -> Result<(), Failure> {
     print(&account.to_string())?;
-    let unwritten = |reason| Error::Write {
+    let mut json = serde_json::to_string_pretty(account).map_err(|error| Error::Write {
         path: path.to_owned(),
-        reason,
-    };
-    let mut json = serde_json::to_string_pretty(account).map_err(|e| unwritten(e.into()))?;
+        reason: error.into(),
+    })?;
     json.push('\n');
-    fs::write(path, json).map_err(unwritten)?;
-    Ok(())
+    Ok(file::replace(path, json.as_bytes())?)
 }
 
 fn progress() -> ProgressBar {

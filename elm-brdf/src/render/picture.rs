@@ -1,7 +1,6 @@
 //! From radiance to files: the display's curve, words, PNG and OpenEXR.
 
-use std::fs;
-use std::io::{Cursor, Write};
+use std::io::Cursor;
 use std::path::Path;
 
 use embedded_graphics::Drawable;
@@ -16,6 +15,7 @@ use image::{ExtendedColorType, ImageEncoder, ImageFormat};
 use super::Rendering;
 use super::error::SceneError;
 use crate::error::{Error, Result};
+use crate::file;
 
 /// A picture in 8-bit sRGB.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -173,7 +173,7 @@ impl Bitmap {
                 ExtendedColorType::Rgb8,
             )
             .map_err(|error| unwritten(path, std::io::Error::other(error)))?;
-        replace(path, &png).map_err(|reason| unwritten(path, reason))
+        file::replace(path, &png)
     }
 }
 
@@ -210,11 +210,11 @@ impl Rendering {
             .flatten()
             .flat_map(|&value| (value as f32).to_ne_bytes())
             .collect();
-        let mut file = Cursor::new(Vec::new());
-        image::codecs::openexr::OpenExrEncoder::new(&mut file)
+        let mut exr = Cursor::new(Vec::new());
+        image::codecs::openexr::OpenExrEncoder::new(&mut exr)
             .write_image(&bytes, self.width, self.height, ExtendedColorType::Rgb32F)
             .map_err(|error| unwritten(path, std::io::Error::other(error)))?;
-        replace(path, file.get_ref()).map_err(|reason| unwritten(path, reason))
+        file::replace(path, exr.get_ref())
     }
 }
 
@@ -223,22 +223,6 @@ fn unwritten(path: &Path, reason: std::io::Error) -> Error {
         path: path.to_owned(),
         reason,
     }
-}
-
-/// Writes beside the file and renames, so that an interruption leaves the old one.
-fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let dir = path.parent().filter(|dir| !dir.as_os_str().is_empty());
-    let mut file = tempfile::NamedTempFile::new_in(dir.unwrap_or(Path::new(".")))?;
-    file.write_all(bytes)?;
-    // Temporary files are private to their owner; a picture is not.
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        file.as_file()
-            .set_permissions(fs::Permissions::from_mode(0o644))?;
-    }
-    file.persist(path)?;
-    Ok(())
 }
 
 /// Linear light as an 8-bit sRGB value (IEC 61966-2-1).

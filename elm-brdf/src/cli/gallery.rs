@@ -1,0 +1,73 @@
+//! `elm-brdf gallery`: a page that shows learnt materials.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use elm_datasets::Invalid;
+
+use super::common::{hint, progress};
+use super::data::Source;
+use super::{Failure, print};
+use crate::error::Error;
+use crate::export::ExportError;
+use crate::gallery::{self, Exhibit};
+use crate::geometry::pairs;
+use crate::protocol::{Folds, cross_validate};
+use crate::render::default_network;
+
+/// Write a page that shows learnt materials: spheres, lobes, errors, sizes, and a sphere to play
+/// with, shaded by the networks in the browser.
+///
+/// Measurements are looked for as 'reproduce' looks for them.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Folder for the page: index.html and a picture of each material.
+    #[arg(short, long, value_name = "DIR")]
+    out: PathBuf,
+    /// Folder of CUReT files.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// 'paper', 'all', or a list of numbers and names, such as '1,39,orange peel'.
+    #[arg(long, value_name = "LIST", default_value = "paper")]
+    materials: String,
+    /// Neurons of each network instead of the usual 100.
+    #[arg(long, value_name = "N")]
+    neurons: Option<usize>,
+}
+
+/// Folds of the cross-validation, and its seed.
+const FOLDS: (usize, u64) = (10, 1);
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let source = Source::find(arguments.data.as_deref())?;
+    let materials = source.select(&arguments.materials)?;
+    let data = source.load(&materials, Invalid::Clamp)?;
+    hint(&source);
+    let network = default_network(data.directions.len(), arguments.neurons);
+    let folds = Folds::new(data.directions.len(), FOLDS.0, FOLDS.1)?;
+    let scores = cross_validate(&*network, &data, &folds, |_, _| {})?;
+    let origin = format!("ELM fitted to {}", source.caption());
+    let mut exhibits = Vec::with_capacity(materials.len());
+    for (index, (score, material)) in scores.iter().zip(&data.materials).enumerate() {
+        let Some(samples) = data.samples(index) else {
+            continue;
+        };
+        let brdf = network.fit(&pairs(&samples.directions), samples.values.view())?;
+        let model = brdf
+            .as_network()
+            .ok_or(Error::Export(ExportError::NoNetwork))?;
+        let squares = score.channels.iter().map(|c| c.held_out.rmse.powi(2));
+        exhibits.push(Exhibit {
+            name: format!("{} {}", material.id, material.name),
+            origin: origin.clone(),
+            model: model.clone(),
+            held_out: Some((squares.sum::<f64>() / score.channels.len() as f64).sqrt()),
+        });
+    }
+    let progress = progress("material");
+    progress.set_length(exhibits.len() as u64);
+    let count = |done| progress.set_position(done as u64);
+    gallery::write(&arguments.out, &exhibits, gallery::PICTURE_SIZE, count)?;
+    progress.finish_and_clear();
+    print(&format!("{}\n", arguments.out.join("index.html").display()))
+}

@@ -1,0 +1,189 @@
+//! Models for other programs: shader and C source with the network inside, and MERL tables.
+//!
+//! [`source`] writes one self-contained function that takes two directions in the surface's frame
+//! (unit vectors, the normal along $+z$, towards the light and towards the viewer) and returns the
+//! BRDF in 1/sr as linear red, green and blue. It is black below either horizon, never negative,
+//! and never above the model's own ceiling. All its arithmetic is in single precision:
+//! standardisation is folded into the weights beforehand, in double precision. Sine, tangens
+//! hyperbolicus and arc tangent are its own, since shader languages leave the accuracy of theirs
+//! open, and output weights magnify what activations lose.
+//!
+//! [`merl`] tabulates any model in the format of the MERL database.
+//!
+//! ```
+//! use elm::{Activation, ElmParams, solve::Ridge};
+//! use elm_brdf::export::{Language, source};
+//! use elm_brdf::{brdf::Fit, features::Features, geometry::pairs, link::Link, model::BrdfParams};
+//! use elm_datasets::{Invalid, MaterialId, synthetic};
+//!
+//! let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
+//! let samples = data.samples(0).ok_or("no such material")?;
+//! let params = BrdfParams {
+//!     features: Features::ReciprocalCosines,
+//!     link: Link::default_log(),
+//!     network: ElmParams::new(40).activation(Activation::Sine).solver(Ridge::leave_one_out()),
+//! };
+//! let model = params.fit(&pairs(&samples.directions), samples.values.view())?;
+//! let network = model.as_network().ok_or("a formula")?;
+//! let shader = source(network, Language::Glsl, "felt")?;
+//! assert!(shader.contains("vec3 felt_eval(vec3 light, vec3 viewer)"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod activations;
+mod dialect;
+mod inputs;
+mod network;
+mod write;
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use elm_datasets::Directions;
+use elm_datasets::merl::Merl;
+use thiserror::Error;
+
+pub use dialect::Language;
+pub use write::source;
+
+use crate::brdf::Brdf;
+use crate::error::{Error, Result};
+use crate::geometry::pairs;
+
+/// What a model can be exported to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Format {
+    /// Source code.
+    Source(Language),
+    /// A table in the format of the MERL database.
+    Merl,
+}
+
+impl Format {
+    /// Every format there is.
+    pub const ALL: [Self; 5] = [
+        Self::Source(Language::Glsl),
+        Self::Source(Language::Wgsl),
+        Self::Source(Language::Hlsl),
+        Self::Source(Language::C),
+        Self::Merl,
+    ];
+
+    /// The format's name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Source(language) => language.name(),
+            Self::Merl => "merl",
+        }
+    }
+
+    /// The format that a file's extension asks for: its name, or `frag`, `vert`, `h`, `binary`.
+    ///
+    /// # Errors
+    /// [`ExportError::Format`] for another extension.
+    pub fn of(path: &Path) -> Result<Self, ExportError> {
+        let unknown = || ExportError::Format {
+            path: path.to_owned(),
+        };
+        let extension = path.extension().and_then(|e| e.to_str());
+        match extension.ok_or_else(unknown)? {
+            "frag" | "vert" => Ok(Self::Source(Language::Glsl)),
+            "h" => Ok(Self::Source(Language::C)),
+            "binary" => Ok(Self::Merl),
+            name => name.parse().map_err(|_| unknown()),
+        }
+    }
+}
+
+impl FromStr for Format {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|format| format.name() == name)
+            .ok_or_else(|| Error::UnknownName {
+                what: "format",
+                name: name.to_owned(),
+                expected: Self::ALL.map(Self::name).join(", "),
+            })
+    }
+}
+
+/// Why a model cannot be exported.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// A neuron's function that has no source, such as one of the user's own.
+    #[error("cannot export the activation '{name}'")]
+    Activation {
+        /// What it is called.
+        name: String,
+    },
+    /// A network input that has no source.
+    #[error("cannot export the input '{name}'")]
+    Input {
+        /// What it is called.
+        name: String,
+    },
+    /// A number beyond single precision.
+    #[error("cannot export {what}: {value} is beyond single precision")]
+    Single {
+        /// Which.
+        what: &'static str,
+        /// The number.
+        value: f64,
+    },
+    /// A name that no language takes for its functions.
+    #[error("'{name}' cannot begin the name of a function (expected letters, digits and _)")]
+    Name {
+        /// The name that was given.
+        name: String,
+    },
+    /// The file's extension says nothing of how to write it.
+    #[error(
+        "cannot tell the format of {} (expected .glsl, .wgsl, .hlsl, .c or .binary, or a format)",
+        path.display()
+    )]
+    Format {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A model that is no network.
+    #[error("only a network can be exported as source")]
+    NoNetwork,
+}
+
+/// The model in the format of the MERL database; one channel stands for all three. Negative
+/// values become 0, and what lies below the horizon has no value.
+///
+/// # Errors
+/// [`Error::Channels`] for a model of another number of channels than 1 or 3; whatever the model's
+/// own evaluation reports.
+pub fn merl(brdf: &dyn Brdf) -> Result<Merl> {
+    /// Pairs at a time.
+    const BLOCK: usize = 1 << 15;
+    let channels = brdf.channels();
+    if channels != 1 && channels != 3 {
+        return Err(Error::Channels { channels });
+    }
+    // The table asks for one pair at a time, and a network answers many at once far faster: the
+    // first pass takes the questions down, the second gives the answers in the same order.
+    let mut asked: Vec<Directions> = Vec::new();
+    Merl::from_fn(|directions| {
+        asked.push(*directions);
+        [0.0; 3]
+    });
+    let mut answers = Vec::with_capacity(asked.len());
+    for block in asked.chunks(BLOCK) {
+        for row in brdf.eval(&pairs(block))?.rows() {
+            let value = |channel: usize| row[channel.min(channels - 1)].max(0.0);
+            answers.push([value(0), value(1), value(2)]);
+        }
+    }
+    let mut answers = answers.into_iter();
+    // Both passes ask alike, so there is an answer for every question.
+    Ok(Merl::from_fn(|_| answers.next().unwrap_or([f64::NAN; 3])))
+}

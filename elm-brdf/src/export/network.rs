@@ -1,0 +1,153 @@
+//! A network as exports need it: standardisation folded into the weights, neurons in order of their
+//! functions, single precision.
+
+use super::ExportError;
+use crate::link::Channel;
+use crate::model::BrdfModel;
+
+/// A model ready to be written.
+pub(super) struct Network {
+    /// Names of the inputs.
+    pub(super) inputs: Vec<&'static str>,
+    pub(super) neurons: Vec<Neuron>,
+    pub(super) outputs: Vec<Output>,
+}
+
+/// A neuron: its function of the weighted sum of the inputs, or of the distance of the weighted
+/// inputs from a centre.
+pub(super) struct Neuron {
+    /// Name of the function.
+    pub(super) activation: String,
+    pub(super) weights: Vec<f32>,
+    pub(super) bias: f32,
+    /// In weighted inputs; `None` where the function is of the sum.
+    pub(super) centre: Option<Vec<f32>>,
+    /// Output weights.
+    pub(super) beta: Vec<f32>,
+}
+
+impl Neuron {
+    /// Whether two can be computed side by side: radial neurons of one group share their weights.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        let (own, others) = (self.centre.is_some(), other.centre.is_some());
+        self.activation == other.activation
+            && own == others
+            && (!own || self.weights == other.weights)
+    }
+}
+
+/// A channel.
+pub(super) struct Output {
+    pub(super) constant: f32,
+    /// Weights of the inputs themselves.
+    pub(super) linear: Vec<f32>,
+    pub(super) link: Channel,
+}
+
+impl Network {
+    pub(super) fn new(model: &BrdfModel) -> Result<Self, ExportError> {
+        let network = model.network();
+        let hidden = network.hidden();
+        let (inputs, outputs) = (network.inputs(), network.outputs());
+        let (beta, intercept) = (network.beta(), network.intercept());
+        // What standardisation does to an input: (x - mean) factor.
+        let scale = |input: usize| network.scaler().map_or(1.0, |s| s.factor()[input]);
+        let mean = |input: usize| network.scaler().map_or(0.0, |s| s.mean()[input]);
+        // Weights of the inputs as they come, and the constant that standardisation adds.
+        let fold = |weights: &[f64]| -> (Vec<f64>, f64) {
+            let scaled: Vec<f64> = (0..inputs).map(|i| weights[i] * scale(i)).collect();
+            let constant = (0..inputs).map(|i| -scaled[i] * mean(i)).sum();
+            (scaled, constant)
+        };
+
+        let mut neurons = Vec::new();
+        let mut constants: Vec<f64> = intercept.to_vec();
+        let mut linear = vec![vec![0.0; inputs]; outputs];
+        let mut add_linear = |weights: &[f64], bias: f64, betas: &[f64]| {
+            for (output, &beta) in betas.iter().enumerate() {
+                constants[output] += beta * bias;
+                for (sum, weight) in linear[output].iter_mut().zip(weights) {
+                    *sum += beta * weight;
+                }
+            }
+        };
+        let of_group = hidden.groups().iter();
+        let of_group = of_group.flat_map(|group| std::iter::repeat_n(group, group.neurons()));
+        for (neuron, group) in of_group.enumerate() {
+            let activation = group.activation().name();
+            let betas = beta.row(neuron).to_vec();
+            let own = hidden.weights().column(neuron).to_vec();
+            if let Some(scales) = group.input_scales() {
+                // |s (x - mean) factor - c| with the centre taken to the inputs as they come.
+                let weights: Vec<f64> = (0..inputs).map(|i| scales[i] * scale(i)).collect();
+                let centre = (0..inputs).map(|i| own[i] + weights[i] * mean(i));
+                neurons.push(Neuron {
+                    activation: activation.to_owned(),
+                    centre: Some(singles("a centre", &centre.collect::<Vec<_>>())?),
+                    weights: singles("a scale", &weights)?,
+                    bias: 0.0,
+                    beta: singles("an output weight", &betas)?,
+                });
+                continue;
+            }
+            let (weights, constant) = fold(&own);
+            let bias = hidden.biases()[neuron] + constant;
+            if activation == "linear" {
+                add_linear(&weights, bias, &betas);
+                continue;
+            }
+            neurons.push(Neuron {
+                activation: activation.to_owned(),
+                weights: singles("a hidden weight", &weights)?,
+                bias: single("a hidden bias", bias)?,
+                centre: None,
+                beta: singles("an output weight", &betas)?,
+            });
+        }
+        // With direct links the inputs' rows follow the neurons'.
+        for input in 0..beta.nrows() - hidden.neurons() {
+            let mut own = vec![0.0; inputs];
+            own[input] = 1.0;
+            let (weights, constant) = fold(&own);
+            add_linear(
+                &weights,
+                constant,
+                &beta.row(hidden.neurons() + input).to_vec(),
+            );
+        }
+        let order = |neuron: &Neuron| (neuron.activation.clone(), neuron.centre.is_some());
+        neurons.sort_by_key(order);
+
+        let outputs = constants
+            .into_iter()
+            .zip(linear)
+            .zip(model.link().by_channel());
+        Ok(Self {
+            inputs: model.features().inputs().to_vec(),
+            neurons,
+            outputs: outputs
+                .map(|((constant, linear), &link)| {
+                    Ok(Output {
+                        constant: single("an intercept", constant)?,
+                        linear: singles("a direct link", &linear)?,
+                        link,
+                    })
+                })
+                .collect::<Result<_, ExportError>>()?,
+        })
+    }
+}
+
+/// Rounded to single precision, if it has the range.
+fn single(what: &'static str, value: f64) -> Result<f32, ExportError> {
+    let rounded = value as f32;
+    if rounded.is_finite() {
+        Ok(rounded)
+    } else {
+        Err(ExportError::Single { what, value })
+    }
+}
+
+fn singles(what: &'static str, values: &[f64]) -> Result<Vec<f32>, ExportError> {
+    values.iter().map(|&value| single(what, value)).collect()
+}

@@ -1,0 +1,219 @@
+//! A page to look at: a sphere, the lobes, the error and the size of every material, and a sphere
+//! whose shading is the [exported](crate::export) network running in the browser.
+//!
+//! [`write`] makes one HTML file with the networks inside and one picture per material beside it.
+//! Nothing is loaded from anywhere else, so the folder can be opened from a disk.
+
+mod lobes;
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::brdf::Brdf;
+use crate::error::{Error, Result};
+use crate::export::{Language, source};
+use crate::file;
+use crate::model::BrdfModel;
+use crate::render::{Material, Options, Scene, Supplied, Supply, render, scene};
+
+/// A material to show.
+#[derive(Debug, Clone)]
+pub struct Exhibit {
+    /// What it is called.
+    pub name: String,
+    /// Where its measurements come from.
+    pub origin: String,
+    /// The learnt material.
+    pub model: BrdfModel,
+    /// Its RMSE in 1/sr on measurements held out, where it is known.
+    pub held_out: Option<f64>,
+}
+
+/// The usual size of a picture, in pixels across and down.
+pub const PICTURE_SIZE: u32 = 320;
+/// Pixels across and down of what the page shows to a test.
+const TEST_SIZE: u32 = 64;
+/// Half the height of the view of a sphere of radius 1.
+const HALF_HEIGHT: f64 = 1.12;
+/// Towards the light, at first.
+const LIGHT: [f64; 3] = [-0.6, 0.7, 1.0];
+/// Irradiance of the light, in all channels.
+const IRRADIANCE: f64 = 2.6;
+
+/// What the page's script reads of an exhibit.
+#[derive(Serialize)]
+struct Card {
+    name: String,
+    origin: String,
+    note: String,
+    facts: Vec<(&'static str, String)>,
+    /// File of the picture.
+    picture: String,
+    /// An SVG element.
+    lobes: String,
+    glsl: String,
+    /// Largest value that is shown, as the renderer has it.
+    ceiling: f64,
+}
+
+/// What the page's script reads of the scene.
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct Settings {
+    intro: String,
+    light: [f64; 3],
+    irradiance: f64,
+    half_height: f64,
+    test_size: u32,
+}
+
+/// The scene that a picture shows, and the page's sphere at first: `viewer` and `up` are the
+/// camera's directions, `light` is towards the light.
+///
+/// # Errors
+/// None with finite directions; [`Error::Scene`] with others.
+pub fn sphere(
+    size: u32,
+    samples: u32,
+    viewer: [f64; 3],
+    up: [f64; 3],
+    light: [f64; 3],
+) -> Result<Scene> {
+    let position = viewer.map(|c| 5.0 * c);
+    let text = format!(
+        "[image]\nwidth = {size}\nheight = {size}\nsamples = {samples}\n\
+         [camera]\nposition = {position:?}\ntarget = [0, 0, 0]\nup = {up:?}\nheight = {height}\n\
+         [material.shown]\nmodel = 'shown'\n\
+         [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'shown'\n\
+         [[directional]]\ntowards = {light:?}\n\
+         irradiance = [{IRRADIANCE}, {IRRADIANCE}, {IRRADIANCE}]\n",
+        height = 2.0 * HALF_HEIGHT
+    );
+    Ok(Scene::parse(&text, Path::new("gallery"))?)
+}
+
+/// The one model of [`sphere`].
+pub struct Only<'a>(
+    /// The model.
+    pub &'a BrdfModel,
+);
+
+impl Supply for Only<'_> {
+    fn supply(&self, _: &scene::Material, _: &Path) -> Result<Supplied> {
+        Ok(Supplied {
+            brdf: Box::new(self.0.clone()),
+            origin: String::new(),
+            name: None,
+        })
+    }
+}
+
+/// Writes `index.html` and a picture of each exhibit into a folder, which is made if it is not
+/// there. Pictures are `size` pixels across and down; `done` is told how many exhibits are
+/// finished.
+///
+/// # Errors
+/// [`Error::Write`] naming the file; [`Error::Export`] for a model that cannot be exported, and
+/// whatever rendering reports.
+pub fn write(
+    dir: &Path,
+    exhibits: &[Exhibit],
+    size: u32,
+    mut done: impl FnMut(usize),
+) -> Result<()> {
+    std::fs::create_dir_all(dir).map_err(|reason| Error::Write {
+        path: dir.to_owned(),
+        reason,
+    })?;
+    let mut cards = Vec::with_capacity(exhibits.len());
+    for (index, exhibit) in exhibits.iter().enumerate() {
+        let picture = format!("sphere-{:02}.png", index + 1);
+        let scene = sphere(size, 16, [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], LIGHT)?;
+        let rendering = render(
+            &scene,
+            &Only(&exhibit.model),
+            Options::default(),
+            &|_, _| {},
+        )?;
+        rendering.write(&dir.join(&picture))?;
+        cards.push(card(exhibit, picture)?);
+        done(index + 1);
+    }
+    let page = page(&cards, exhibits)?;
+    file::replace(&dir.join("index.html"), page.as_bytes())
+}
+
+fn card(exhibit: &Exhibit, picture: String) -> Result<Card> {
+    let Exhibit {
+        name,
+        origin,
+        model,
+        held_out,
+    } = exhibit;
+    let material = Material::new(Box::new(model.clone()), [1.0; 3], false)?;
+    let glsl = source(model, Language::Glsl, "shown")?;
+    let groups = model.network().hidden().groups().iter();
+    let neurons: Vec<String> = groups
+        .map(|group| format!("{} {} neurons", group.neurons(), group.activation()))
+        .collect();
+    let size = format!("{} numbers per channel", model.floats_per_channel());
+    let mut facts = vec![
+        ("Network", neurons.join(", ")),
+        ("Inputs", model.features().inputs().join(", ")),
+        ("Size", size),
+        ("As GLSL", format!("{} kB", glsl.len().div_ceil(1000))),
+        (
+            "Largest albedo",
+            format!("{:.2}", material.largest_albedo()),
+        ),
+    ];
+    if let Some(error) = held_out {
+        facts.insert(0, ("Held-out RMSE", format!("{error:.4} per sr")));
+    }
+    let note = match held_out {
+        Some(error) => format!("RMSE {error:.4}/sr, {} numbers", model.floats_per_channel()),
+        None => format!("{} numbers", model.floats_per_channel()),
+    };
+    Ok(Card {
+        name: name.clone(),
+        origin: origin.clone(),
+        note,
+        facts,
+        picture,
+        lobes: lobes::draw(model)?,
+        glsl,
+        ceiling: material.ceiling()[0],
+    })
+}
+
+fn page(cards: &[Card], exhibits: &[Exhibit]) -> Result<String> {
+    let length = LIGHT.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let mut origins: Vec<&str> = exhibits.iter().map(|e| e.origin.as_str()).collect();
+    origins.sort_unstable();
+    origins.dedup();
+    let settings = Settings {
+        intro: format!(
+            "Reflectance learnt from measurements by networks with one random layer. {}. The \
+             sphere is shaded by the network itself, running on your graphics card: drag to move \
+             the light or the view.",
+            origins.join("; ")
+        ),
+        light: LIGHT.map(|c| c / length),
+        irradiance: IRRADIANCE,
+        half_height: HALF_HEIGHT,
+        test_size: TEST_SIZE,
+    };
+    Ok(include_str!("page.html")
+        .replacen("SCENE", &script(&settings)?, 1)
+        .replacen("EXHIBITS", &script(&cards)?, 1))
+}
+
+/// As a value in a script; no text in it can end the script.
+fn script(value: &impl Serialize) -> Result<String> {
+    let json = serde_json::to_string(value).map_err(|error| Error::Write {
+        path: "index.html".into(),
+        reason: error.into(),
+    })?;
+    Ok(json.replace("</", "<\\/").replace("<!--", "<\\!--"))
+}

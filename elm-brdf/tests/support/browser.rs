@@ -1,0 +1,74 @@
+//! A headless Chromium, where there is one.
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// The browser's program, found in PATH.
+pub(crate) fn chromium() -> Option<PathBuf> {
+    ["chromium", "chromium-browser", "google-chrome"]
+        .into_iter()
+        .find_map(program)
+}
+
+/// A program in PATH.
+pub(crate) fn program(name: &str) -> Option<PathBuf> {
+    std::env::split_paths(&std::env::var_os("PATH")?)
+        .map(|dir| dir.join(name))
+        .find(|path| path.is_file())
+}
+
+/// Opens a file, with what may follow its name, and returns what the page says on its console, up
+/// to the first message that is `last`. Errors of the page are messages as well.
+pub(crate) fn console(chromium: &Path, page: &Path, suffix: &str, last: &str) -> Vec<String> {
+    let profile = tempfile::tempdir().unwrap();
+    let mut browser = Command::new(chromium)
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            // Shaders run on the processor, by the book.
+            "--use-angle=swiftshader",
+            "--enable-unsafe-swiftshader",
+            "--enable-unsafe-webgpu",
+            "--use-webgpu-adapter=swiftshader",
+            "--enable-logging=stderr",
+            "--window-size=1280,900",
+            "--disable-quic",
+            "--no-first-run",
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-sync",
+        ])
+        .arg(format!("--user-data-dir={}", profile.path().display()))
+        .arg(format!("file://{}{suffix}", page.display()))
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut messages = Vec::new();
+    for line in BufReader::new(browser.stderr.take().unwrap()).split(b'\n') {
+        let line = String::from_utf8_lossy(&line.unwrap()).into_owned();
+        // [process:thread:time:INFO:CONSOLE:line] "message", source: file (line)
+        let Some((_, rest)) = line.split_once(":CONSOLE:") else {
+            continue;
+        };
+        let start = rest.find('"').map_or(0, |at| at + 1);
+        let end = rest.rfind("\", source:").unwrap_or(rest.len());
+        let message = rest[start..end.max(start)].to_owned();
+        // The driver's advice on speed is no message of the page.
+        if message.contains("GL Driver Message (OpenGL, Performance") {
+            continue;
+        }
+        let done = message == last;
+        messages.push(message);
+        if done {
+            break;
+        }
+    }
+    // It may have ended by itself.
+    let _ = browser.kill();
+    browser.wait().unwrap();
+    messages
+}
