@@ -32,6 +32,16 @@ pub struct Metrics {
 }
 
 impl Metrics {
+    /// The measures of no predictions at all: no error, and nothing that would need one.
+    pub(crate) const NONE: Self = Self {
+        rmse: 0.0,
+        mae: 0.0,
+        correlation: None,
+        relative_rmse: None,
+        log_cosine_mae: 0.0,
+        cube_root_rmse: 0.0,
+    };
+
     /// The errors of `predicted` against `truth`, both BRDF in 1/sr without the cosine, of shape
     /// (pairs, channels), at these pairs of directions.
     ///

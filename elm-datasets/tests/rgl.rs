@@ -8,10 +8,11 @@ mod support;
 
 use std::f64::consts::PI;
 use std::fs;
+use std::path::Path;
 
 use bsdf::{Field, Ggx, bytes, file, floats, tabulate};
 use elm_datasets::rgl::{Channels, Problem, Rgl};
-use elm_datasets::{Directions, Error, Sampling};
+use elm_datasets::{Directions, Error, Sampling, scattered};
 use proptest::prelude::*;
 
 const ELEVATIONS: [f64; 2] = [0.25, 1.0];
@@ -91,6 +92,28 @@ fn tables_that_are_exact_give_the_value_on_paper() {
                 // A few dozen roundings; the square root near the normal turns 1e-16 in theta_m
                 // into up to 1e-8 in x only for theta_m below 1e-16.
                 assert!((found - expected).abs() < 1e-12 * expected, "{pair:?}");
+            }
+        }
+    }
+}
+
+/// `benches/peers/rgl_mitsuba.py` has made the files, and asked the format's authors' renderer for
+/// the values.
+#[test]
+fn the_authors_renderer_gives_the_same_values() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+    for name in ["rgb", "spectral"] {
+        let path = |end: &str| data.join(format!("mitsuba-{name}.{end}"));
+        let rgl = Rgl::read(path("bsdf")).unwrap();
+        let theirs = scattered::read(path("csv"), &scattered::Options::default()).unwrap();
+        assert_eq!(rgl.channels().names(), theirs.channels);
+        assert_eq!(theirs.values.nrows(), 200);
+        for (pair, values) in theirs.directions.iter().zip(theirs.values.rows()) {
+            for (found, &expected) in rgl.eval(pair).into_iter().zip(values) {
+                // The renderer calculates in 32 bits, 6e-8 for each of some hundred operations,
+                // and divides by cosines down to 0.05.
+                let error = (found / expected - 1.0).abs();
+                assert!(error < 1e-4, "{name}, {pair:?}: {found} against {expected}");
             }
         }
     }

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use elm::Scalar;
 use elm::solve::{LeastSquares, PseudoInverse, Solver};
+use elm_brdf::report::plot;
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 use ndarray::Array2;
@@ -108,6 +109,7 @@ const COLOURS: [RGBColor; 5] = [
 /// # Errors
 /// What the drawing library reports.
 pub fn svg(curves: &[Curve]) -> Result<String, Box<dyn Error>> {
+    plot::font();
     let mut picture = String::new();
     {
         let area = SVGBackend::with_string(&mut picture, (840, 520)).into_drawing_area();

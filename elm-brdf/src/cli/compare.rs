@@ -6,30 +6,37 @@ use std::time::Instant;
 use clap::Args;
 use elm::solve::{PseudoInverse, Ridge};
 use elm::{Activation, ElmParams};
-use elm_datasets::{Invalid, Measurements};
+use elm_datasets::{Measurements, Origin};
+use ndarray::{ArrayView2, Axis};
 
 use super::common::{hint, one_of, progress, usage};
 use super::data::Source;
+use super::samples::{Material, Reading};
 use super::{Failure, print};
+use crate::brdf::Fit;
 use crate::error::Error;
 use crate::features::Features;
-use crate::geometry::pairs;
+use crate::geometry::{Pair, pairs};
 use crate::link::Link;
 use crate::model::BrdfParams;
-use crate::protocol::{Folds, cross_validate};
-use crate::reference::{self, Reference};
-use crate::report::{Comparison, Entry, Format};
+use crate::protocol::{Folds, MaterialScores, cross_validate, cross_validate_samples};
+use crate::reference::{self, Growth, Reference};
+use crate::report::plot::{self, Shown};
+use crate::report::{Comparison, Data, Entry, Format, Words};
 
 /// Cross-validate every model on the same folds: analytic models, the database's own basis,
 /// interpolators, Gaussian processes, and extreme learning machines.
 ///
-/// Measurements are looked for as 'reproduce' looks for them.
+/// Without SAMPLES many materials of CUReT are compared; measurements are looked for as
+/// 'reproduce' looks for them.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Folder of CUReT files: table.txt with abrdf.dat, or with rbrdf.dat, gbrdf.dat and
-    /// bbrdf.dat.
-    #[arg(long, value_name = "DIR")]
-    data: Option<PathBuf>,
+    /// Samples of one material: a file (CSV, MERL .binary, RGL .bsdf, pbrt-v2 .brdf), curet:NAME,
+    /// or synthetic:paint.
+    #[arg(value_name = "SAMPLES", conflicts_with = "materials")]
+    samples: Option<String>,
+    #[command(flatten)]
+    reading: Reading,
     /// 'paper', 'all', or a list of numbers and names, such as '1,39,orange peel'.
     #[arg(long, value_name = "LIST", default_value = "all")]
     materials: String,
@@ -42,44 +49,192 @@ pub(super) struct Arguments {
     /// Seed of the folds and of random layers.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Number of seeds, at least 1: figures are means over this one and those that follow.
+    #[arg(long, value_name = "N", default_value_t = 1,
+          value_parser = clap::value_parser!(u16).range(1..))]
+    seeds: u16,
     /// Form of the output.
     #[arg(long, value_name = "FORM", default_value = "table",
           value_parser = one_of::<Format>(Format::ALL.map(Format::name)))]
     format: Format,
-    /// What to do with negative BRDF values: set them to 0, keep them, or drop the measurement.
-    #[arg(long, value_name = "WAY", default_value = "clamp",
-          value_parser = one_of::<Invalid>(Invalid::ALL.map(Invalid::name)))]
-    invalid: Invalid,
+    /// Also draw the best model's pictures into this folder, as SVG and PNG.
+    #[arg(long, value_name = "DIR")]
+    plot: Option<PathBuf>,
+}
+
+/// What is compared on.
+enum Subject {
+    /// Many materials at the same directions.
+    Materials(Source, Measurements),
+    /// One material.
+    Samples(Material),
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
-    let models = select(&arguments.models, arguments.seed)?;
-    let source = Source::find(arguments.data.as_deref())?;
-    let materials = source.select(&arguments.materials)?;
-    let data = source.load(&materials, arguments.invalid)?;
-    let folds =
-        Folds::new(data.directions.len(), arguments.folds, arguments.seed).map_err(usage)?;
-    hint(&source);
+    let seeds: Vec<u64> = (arguments.seed..).take(arguments.seeds.into()).collect();
+    let names = select(&arguments.models, arguments.seed)?;
+    let subject = match &arguments.samples {
+        Some(name) => Subject::Samples(arguments.reading.read(name)?),
+        None => {
+            let source = Source::find(arguments.reading.data.as_deref())?;
+            let materials = source.select(&arguments.materials)?;
+            let data = source.load(&materials, arguments.reading.invalid)?;
+            hint(&source);
+            Subject::Materials(source, data)
+        }
+    };
+    // Before the first fit.
+    Folds::new(subject.rows(), arguments.folds, arguments.seed).map_err(usage)?;
 
     let progress = progress("model");
-    progress.set_length(models.len() as u64);
+    progress.set_length((names.len() * seeds.len()) as u64);
+    // By model, then by seed; the best so far is kept for its pictures.
     let mut entries = Vec::new();
-    for model in &models {
-        entries.push(entry(model, &data, &folds)?);
-        progress.inc(1);
+    let mut best: Option<(f64, String, Vec<MaterialScores>)> = None;
+    for index in 0..names.len() {
+        let mut runs = Vec::new();
+        let fitting = Instant::now();
+        for &seed in &seeds {
+            let model = select(&arguments.models, seed)?
+                .swap_remove(index)
+                .affordable(seed);
+            let folds = Folds::new(subject.rows(), arguments.folds, seed).map_err(usage)?;
+            runs.push(subject.cross_validate(model.method.as_ref(), &folds)?);
+            progress.inc(1);
+        }
+        let entry = subject.entry(&names[index], fitting, arguments.folds, &runs)?;
+        let error = entry.held_out.rmse;
+        if best.as_ref().is_none_or(|best| error < best.0) {
+            best = Some((error, entry.model.clone(), runs.swap_remove(0)));
+        }
+        entries.push(entry);
     }
     progress.finish_and_clear();
 
+    let scores = best.as_ref().map_or(&[][..], |best| best.2.as_slice());
+    let data = subject.data(scores);
+    if let (Some(dir), Some((_, model, scores))) = (&arguments.plot, &best) {
+        let title = format!("{}; {model}, seed {}", data.source, arguments.seed);
+        plot::write(dir, &title, &subject.shown(scores))?;
+    }
     let comparison = Comparison::new(
-        source.describe(),
-        &data,
-        folds.count(),
+        data,
+        arguments.folds,
         arguments.seed,
+        seeds.len(),
         entries,
         start.elapsed().as_secs_f64(),
     );
     print(&comparison.render(arguments.format)?)
+}
+
+impl Subject {
+    fn rows(&self) -> usize {
+        match self {
+            Self::Materials(_, data) => data.directions.len(),
+            Self::Samples(material) => material.samples.directions.len(),
+        }
+    }
+
+    fn cross_validate(
+        &self,
+        method: &dyn Fit,
+        folds: &Folds,
+    ) -> Result<Vec<MaterialScores>, Failure> {
+        Ok(match self {
+            Self::Materials(_, data) => cross_validate(method, data, folds, |_, _| {})?,
+            Self::Samples(material) => {
+                let (name, samples) = (&material.name, &material.samples);
+                let mut scores = cross_validate_samples(method, name, samples, folds, |_, _| {})?;
+                scores.id = material.id;
+                vec![scores]
+            }
+        })
+    }
+
+    fn data(&self, scores: &[MaterialScores]) -> Data {
+        match self {
+            Self::Materials(source, data) => Data::of(source.describe(), data, scores),
+            Self::Samples(material) => Data::of_samples(
+                material.source.clone(),
+                material.synthetic,
+                &material.samples,
+                material.invalid,
+                scores,
+            ),
+        }
+    }
+
+    /// The directions of the first material, and its values.
+    fn first(&self) -> Option<(Vec<Pair>, ArrayView2<'_, f64>)> {
+        match self {
+            Self::Materials(_, data) => {
+                let material = data.materials.first()?;
+                let directions = &data.samples(0)?.directions;
+                Some((pairs(directions), material.values.view()))
+            }
+            Self::Samples(material) => Some((
+                pairs(&material.samples.directions),
+                material.samples.values.view(),
+            )),
+        }
+    }
+
+    fn entry(
+        &self,
+        model: &Reference,
+        fitting: Instant,
+        folds: usize,
+        runs: &[Vec<MaterialScores>],
+    ) -> Result<Entry, Failure> {
+        let seconds = fitting.elapsed().as_secs_f64();
+        let (channels, measured) = match self {
+            Self::Materials(_, data) => (&data.channels, data.origin == Origin::Curet),
+            Self::Samples(material) => (&material.samples.channels, material.id.is_some()),
+        };
+        let words = Words {
+            model: model.name.clone(),
+            features: model.features.map(|features| features.name().to_owned()),
+            target: model.link.map(|link| link.name().to_owned()),
+            network: model.network,
+        };
+        let train = self.rows() - self.rows() / folds;
+        let most = model.growth.most_rows().unwrap_or(train);
+        let floats = match self.first() {
+            // Fitted to no more than a cross-validation fits it to, at little cost.
+            Some((pairs, values)) => {
+                let rows = pairs.len().min(most);
+                let values = values.slice_axis(Axis(0), ndarray::Slice::from(..rows));
+                let model = model.method.fit(&pairs[..rows], values)?;
+                model.floats_per_channel()
+            }
+            None => 0,
+        };
+        Ok(Entry {
+            rows: train.min(most),
+            floats_per_channel: floats,
+            seconds,
+            ..Entry::new(words, channels, measured, runs)
+        })
+    }
+
+    fn shown<'a>(&'a self, scores: &'a [MaterialScores]) -> Vec<Shown<'a>> {
+        match self {
+            Self::Materials(_, data) => Shown::of(data, scores),
+            Self::Samples(material) => scores
+                .iter()
+                .map(|scores| {
+                    Shown::new(
+                        material.name.clone(),
+                        &material.samples.directions,
+                        material.samples.values.view(),
+                        scores,
+                    )
+                })
+                .collect(),
+        }
+    }
 }
 
 /// The models of these names, on all the inputs and targets that they come with.
@@ -113,7 +268,8 @@ fn networks(seed: u64) -> [Reference; 2] {
         name: name.to_owned(),
         features: Some(params.features),
         link: Some(params.link),
-        growth: reference::Growth::Linear,
+        growth: Growth::Linear,
+        network: true,
         method: Box::new(params),
     };
     [
@@ -140,28 +296,4 @@ fn networks(seed: u64) -> [Reference; 2] {
             },
         ),
     ]
-}
-
-fn entry(model: &Reference, data: &Measurements, folds: &Folds) -> Result<Entry, Failure> {
-    let start = Instant::now();
-    let scores = cross_validate(model.method.as_ref(), data, folds, |_, _| {})?;
-    let seconds = start.elapsed().as_secs_f64();
-    let floats = match data.samples(0) {
-        Some(samples) => model
-            .method
-            .fit(&pairs(&samples.directions), samples.values.view())?
-            .floats_per_channel(),
-        None => 0,
-    };
-    Ok(Entry {
-        floats_per_channel: floats,
-        seconds,
-        ..Entry::new(
-            model.name.clone(),
-            model.features.map(|features| features.name().to_owned()),
-            model.link.map(|link| link.name().to_owned()),
-            data,
-            &scores,
-        )
-    })
 }

@@ -10,6 +10,7 @@ mod fetch;
 mod gallery;
 mod render;
 mod reproduce;
+mod samples;
 
 use std::io::{self, Write};
 use std::process::ExitCode;

@@ -1,20 +1,22 @@
 //! `elm-brdf reproduce`: the paper's Tables I to III, recomputed.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
 use elm::solve::Solver;
 use elm::{Activation, ElmParams};
-use elm_datasets::Invalid;
+use elm_datasets::{Invalid, Measurements};
 
 use super::common::{hint, one_of, progress, usage};
 use super::data::Source;
 use super::{Failure, print};
+use crate::brdf::Fit;
 use crate::features::Features;
 use crate::link::Link;
 use crate::model::BrdfParams;
-use crate::protocol::{Folds, cross_validate};
+use crate::protocol::{Folds, MaterialScores, cross_validate};
+use crate::report::plot::{self, Shown};
 use crate::report::{Format, Protocol, Report, Seconds};
 
 /// Recompute the paper's Tables I to III by cross-validation, beside what the paper printed.
@@ -47,6 +49,10 @@ pub(super) struct Arguments {
         default_value_t = 1
     )]
     seed: u64,
+    /// Number of seeds, at least 1: figures are means over this one and those that follow.
+    #[arg(long, value_name = "N", default_value_t = 1,
+          value_parser = clap::value_parser!(u16).range(1..))]
+    seeds: u16,
     /// Hidden neurons, at least 1.
     #[arg(
         long,
@@ -71,6 +77,10 @@ pub(super) struct Arguments {
     /// Also write every form to this folder, as reproduce.txt, .md, .csv and .json.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Also draw pictures into this folder, as SVG and PNG: predicted against measured, error by
+    /// angle, error by material, and lobes in the plane of incidence of the first 15 materials.
+    #[arg(long, value_name = "DIR")]
+    plot: Option<PathBuf>,
     /// What to do with negative BRDF values: set them to 0, keep them, or drop the measurement.
     #[arg(long, value_name = "WAY", default_value = "clamp",
           value_parser = one_of::<Invalid>(Invalid::ALL.map(Invalid::name)))]
@@ -79,45 +89,54 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
-    let network = ElmParams::new(arguments.neurons)
-        .activation(arguments.activation.clone())
-        .solver(arguments.solver)
-        // Equation 7 has no constant term.
-        .intercept(false)
-        .seed(arguments.seed);
-    network.clone().check().map_err(usage)?;
+    let params = |seed| BrdfParams {
+        features: Features::Paper,
+        link: Link::Identity,
+        network: ElmParams::new(arguments.neurons)
+            .activation(arguments.activation.clone())
+            .solver(arguments.solver)
+            // Equation 7 has no constant term.
+            .intercept(false)
+            .seed(seed),
+    };
+    let first = params(arguments.seed);
+    first.network.clone().check().map_err(usage)?;
 
     let source = Source::find(arguments.data.as_deref())?;
     let materials = source.select(&arguments.materials)?;
     let data = source.load(&materials, arguments.invalid)?;
     let load = start.elapsed().as_secs_f64();
 
-    let folds =
-        Folds::new(data.directions.len(), arguments.folds, arguments.seed).map_err(usage)?;
-    let params = BrdfParams {
-        features: Features::Paper,
-        link: Link::Identity,
-        network,
-    };
+    let rows = data.directions.len();
+    Folds::new(rows, arguments.folds, arguments.seed).map_err(usage)?;
+    let seeds: Vec<u64> = (arguments.seed..).take(arguments.seeds.into()).collect();
     let protocol = Protocol {
         model: "paper".to_owned(),
-        features: params.features.name().to_owned(),
-        target: params.link.name().to_owned(),
+        features: first.features.name().to_owned(),
+        target: first.link.name().to_owned(),
         neurons: arguments.neurons,
         activation: arguments.activation.name().to_owned(),
         solver: arguments.solver.name().to_owned(),
         folds: arguments.folds,
         seed: arguments.seed,
-        seeds: 1,
+        seeds: seeds.len(),
     };
     hint(&source);
     let progress = progress("fold");
-    let scores = cross_validate(&params, &data, &folds, |done, all| {
-        progress.set_length(all as u64);
-        progress.set_position(done as u64);
-    });
+    let mut runs = Vec::new();
+    for (index, &seed) in seeds.iter().enumerate() {
+        let folds = Folds::new(rows, arguments.folds, seed).map_err(usage)?;
+        runs.push(cross_validate(
+            &params(seed),
+            &data,
+            &folds,
+            |done, all| {
+                progress.set_length((all * seeds.len()) as u64);
+                progress.set_position((all * index + done) as u64);
+            },
+        )?);
+    }
     progress.finish_and_clear();
-    let scores = scores?;
 
     let total = start.elapsed().as_secs_f64();
     let seconds = Seconds {
@@ -125,9 +144,36 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         fit: total - load,
         total,
     };
-    let report = Report::new(source.describe(), &data, protocol, &[scores], seconds);
+    let report = Report::new(source.describe(), &data, protocol, &runs, seconds);
+    if let (Some(dir), Some(scores)) = (&arguments.plot, runs.first()) {
+        draw(dir, &report, &data, scores, &first)?;
+    }
     if let Some(dir) = &arguments.out {
         report.write(dir)?;
     }
     print(&report.render(arguments.format)?)
+}
+
+/// Pictures of the first seed's predictions, and lobes of a model of all measurements.
+fn draw(
+    dir: &Path,
+    report: &Report,
+    data: &Measurements,
+    scores: &[MaterialScores],
+    method: &dyn Fit,
+) -> Result<(), Failure> {
+    let protocol = &report.protocol;
+    let title = format!(
+        "{}; {} model, {} {} neurons, {}, seed {}",
+        report.data.source,
+        protocol.model,
+        protocol.neurons,
+        protocol.activation,
+        protocol.solver,
+        protocol.seed,
+    );
+    plot::write(dir, &title, &Shown::of(data, scores))?;
+    let title = format!("{title}, fitted to all measurements");
+    plot::write_fitted_lobes(dir, &title, data, method)?;
+    Ok(())
 }

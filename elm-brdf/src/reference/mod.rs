@@ -35,6 +35,7 @@ mod kernel;
 mod koenderink;
 mod neighbours;
 mod radial;
+mod thinned;
 
 use elm::solve::Ridge;
 
@@ -43,6 +44,7 @@ pub use gaussian_process::{Covariance, GaussianProcess};
 pub use koenderink::Koenderink;
 pub use neighbours::Neighbours;
 pub use radial::{Radial, RadialBasis, Smoothing};
+use thinned::Thinned;
 
 use crate::brdf::Fit;
 use crate::features::Features;
@@ -58,6 +60,9 @@ pub struct Reference {
     pub link: Option<Link>,
     /// How its cost grows with the measurements.
     pub growth: Growth,
+    /// Whether it is one of this project's networks after all, among the references for the sake
+    /// of a table.
+    pub network: bool,
     /// The method.
     pub method: Box<dyn Fit>,
 }
@@ -73,6 +78,22 @@ pub enum Growth {
     Cubic,
     /// The same, once for each of many candidates.
     ManyCubic,
+}
+
+impl Reference {
+    /// With a limit to the measurements that the method is given, where its cost grows fast:
+    /// a random subset of a file with many.
+    #[must_use]
+    pub fn affordable(self, seed: u64) -> Self {
+        let Some(most) = self.growth.most_rows() else {
+            return self;
+        };
+        let method = self.method;
+        Self {
+            method: Box::new(Thinned { method, most, seed }),
+            ..self
+        }
+    }
 }
 
 impl Growth {
@@ -105,6 +126,7 @@ fn with_candidates(candidates: usize) -> Vec<Reference> {
             features: None,
             link: None,
             growth: Growth::Grid,
+            network: false,
             method: Box::new(model),
         })
         .collect();
@@ -113,6 +135,7 @@ fn with_candidates(candidates: usize) -> Vec<Reference> {
         features: None,
         link: None,
         growth: Growth::Linear,
+        network: false,
         // Order 8 overfits without: 55 coefficients, some 185 measurements.
         method: Box::new(Koenderink {
             order,
@@ -176,6 +199,7 @@ fn interpolators(features: Features, link: Link, candidates: usize) -> Vec<Refer
             features: Some(features),
             link: Some(link),
             growth,
+            network: false,
             method,
         })
         .collect()

@@ -2,6 +2,7 @@
 
 mod comparison;
 mod csv;
+pub mod plot;
 mod tables;
 
 use std::fs;
@@ -9,7 +10,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use elm_datasets::{MaterialId, Measurements, Origin};
+use elm_datasets::{MaterialId, Measurements, Origin, Samples};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
@@ -19,7 +20,7 @@ use crate::published;
 use crate::quality::NoiseFloor;
 use tables::Measure;
 
-pub use comparison::{Comparison, Entry};
+pub use comparison::{Comparison, Entry, OfMaterial, Words};
 
 /// Everything that `reproduce` prints. Its JSON form is this structure, field for field.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -288,9 +289,33 @@ impl Channel {
 }
 
 impl Data {
-    fn of(source: String, data: &Measurements, scores: &[MaterialScores]) -> Self {
-        let channels = || scores.iter().flat_map(|material| &material.channels);
-        let floors = channels().filter_map(|channel| channel.noise_floor);
+    /// Samples of a single material, with the scores of any model on them.
+    #[must_use]
+    pub fn of_samples(
+        source: String,
+        synthetic: bool,
+        samples: &Samples,
+        invalid: usize,
+        scores: &[MaterialScores],
+    ) -> Self {
+        let (saturated, noise_floor) = quality(scores);
+        Self {
+            source,
+            synthetic,
+            channels: samples.channels.clone(),
+            materials: 1,
+            measurements: samples.directions.len(),
+            invalid,
+            values: samples.values.len(),
+            saturated,
+            noise_floor,
+        }
+    }
+
+    /// Measurements of many materials, with the scores of any model on them.
+    #[must_use]
+    pub fn of(source: String, data: &Measurements, scores: &[MaterialScores]) -> Self {
+        let (saturated, noise_floor) = quality(scores);
         Self {
             source,
             synthetic: matches!(data.origin, Origin::Synthetic { .. }),
@@ -299,10 +324,20 @@ impl Data {
             measurements: data.directions.len(),
             invalid: data.invalid,
             values: data.materials.iter().map(|m| m.values.len()).sum(),
-            saturated: channels().map(|channel| channel.saturated.len()).sum(),
-            noise_floor: median(floors.map(|floor| floor.sigma).collect()),
+            saturated,
+            noise_floor,
         }
     }
+}
+
+/// How many values look saturated, and the median noise floor.
+fn quality(scores: &[MaterialScores]) -> (usize, Option<f64>) {
+    let channels = || scores.iter().flat_map(|material| &material.channels);
+    let floors = channels().filter_map(|channel| channel.noise_floor);
+    (
+        channels().map(|channel| channel.saturated.len()).sum(),
+        median(floors.map(|floor| floor.sigma).collect()),
+    )
 }
 
 /// The middle value, or the mean of the two in the middle.

@@ -1,9 +1,26 @@
 //! The program as a user runs it, away from this machine's own data.
 
-use std::path::PathBuf;
+// Each test program uses a part of it.
+#![allow(dead_code)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
+use serde_json::Value;
 use tempfile::TempDir;
+
+/// Holds a command's JSON against its schema in docs/.
+pub(crate) fn check_schema(command: &str, report: &Value) {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
+    let text = fs::read_to_string(docs.join(format!("{command}.schema.json"))).unwrap();
+    let validator = jsonschema::validator_for(&serde_json::from_str(&text).unwrap()).unwrap();
+    let errors: Vec<String> = validator
+        .iter_errors(report)
+        .map(|e| format!("{}: {e}", e.instance_path()))
+        .collect();
+    assert!(errors.is_empty(), "{errors:#?}");
+}
 
 /// The program in an empty environment: no data folder is named and the cache is empty.
 pub(crate) struct Program {

@@ -1,0 +1,72 @@
+//! Methods that take no more than so many measurements.
+
+use ndarray::{ArrayView2, Axis};
+use rand::SeedableRng;
+use rand::seq::index;
+use rand_chacha::ChaCha8Rng;
+
+use crate::brdf::{Brdf, Fit};
+use crate::error::Result;
+use crate::geometry::Pair;
+
+/// A method that is fitted to a random subset where there are more measurements than it can
+/// afford: dense kernel matrices grow with the square of the rows, their decompositions with the
+/// cube.
+pub(crate) struct Thinned {
+    pub(crate) method: Box<dyn Fit>,
+    /// The most measurements that it is given.
+    pub(crate) most: usize,
+    /// Seed of the subset.
+    pub(crate) seed: u64,
+}
+
+impl Fit for Thinned {
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+        if pairs.len() <= self.most || pairs.len() != values.nrows() {
+            return self.method.fit(pairs, values);
+        }
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        // Streams 0 and 1 draw hidden layers and folds.
+        random.set_stream(2);
+        let mut rows = index::sample(&mut random, pairs.len(), self.most).into_vec();
+        rows.sort_unstable();
+        let kept: Vec<Pair> = rows.iter().map(|&row| pairs[row]).collect();
+        self.method.fit(&kept, values.select(Axis(0), &rows).view())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::features::Features;
+    use crate::geometry::cartesian;
+    use crate::link::Link;
+    use crate::reference::Neighbours;
+    use ndarray::Array2;
+
+    #[test]
+    fn no_more_rows_than_allowed_are_used_and_the_seed_says_which() {
+        let pairs: Vec<Pair> = (0..50)
+            .map(|i| Pair {
+                incident: cartesian(0.02 * f64::from(i), 0.0),
+                outgoing: cartesian(0.5, 0.1 * f64::from(i)),
+            })
+            .collect();
+        let values = Array2::from_shape_fn((50, 1), |(row, _)| row as f64);
+        let fit = |most, seed| {
+            let method = Box::new(Neighbours::nearest(Features::Cosines, Link::Identity));
+            let thinned = Thinned { method, most, seed };
+            let model = thinned.fit(&pairs, values.view()).unwrap();
+            model.eval(&pairs).unwrap()
+        };
+        // The nearest neighbour gives back a row's own value where the row was kept.
+        let kept = |predicted: &Array2<f64>| {
+            let same = predicted.iter().zip(&values).filter(|(a, b)| a == b);
+            same.count()
+        };
+        assert_eq!(kept(&fit(50, 1)), 50);
+        assert_eq!(kept(&fit(12, 1)), 12);
+        assert_eq!(fit(12, 1), fit(12, 1));
+        assert_ne!(fit(12, 1), fit(12, 2));
+    }
+}
