@@ -131,7 +131,11 @@ mod tests {
     #[test]
     fn a_seed_gives_the_same_numbers_and_rows_are_only_added() {
         let (few, many) = (samples(50, 7).unwrap(), samples(80, 7).unwrap());
-        assert_eq!(few.values, many.values.slice(ndarray::s![..50, ..]));
+        assert!(
+            few.values
+                .iter()
+                .eq(many.values.iter().take(few.values.len()))
+        );
         assert_ne!(few.values, samples(50, 8).unwrap().values);
         assert!(matches!(samples(0, 1), Err(Error::Rows { .. })));
     }

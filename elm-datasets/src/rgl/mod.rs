@@ -26,8 +26,10 @@
 //! beyond the ends of `theta_i`. `luminance` serves to draw directions, which nothing here does.
 //!
 //! **Not checked on a file of the database**, for none was at hand: this was written from the
-//! publication and its authors' description of the format, and is checked on files made from
-//! formulas, where every step has a known answer. The authors' renderer, Mitsuba, takes the viewer
+//! publication and its authors' description of the format. It is checked on files made from
+//! formulas: where every step has a known answer, and against the authors' renderer, which gives
+//! the same values to its 32 bits for an RGB and a spectral file (`benches/peers/rgl_mitsuba.py`
+//! makes them). That renderer, Mitsuba 3.9.1, takes the viewer
 //! for $\omega_i$ and the light for $\omega_o$; here they are what their names say. For a material
 //! that is reciprocal it makes no difference.
 
