@@ -17,6 +17,17 @@ pub enum Error {
     /// The network could not be fitted or evaluated.
     #[error(transparent)]
     Elm(#[from] elm::Error),
+    /// A model's file could not be written or read.
+    #[error(transparent)]
+    File(#[from] elm::persist::Error),
+    /// A model's file could not be read.
+    #[error("{}: {reason}", path.display())]
+    Contents {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: elm::persist::Error,
+    },
     /// Files could not be fetched.
     #[cfg(feature = "fetch")]
     #[error(transparent)]

@@ -28,6 +28,10 @@ pub enum Features {
     /// viewer, as measurements do that are not reciprocal.
     Cosines,
     /// $\cos\theta_h$, $\cos\theta_d$, $\cos\theta_i + \cos\theta_o$ and
+    /// $\cos\theta_o - \cos\theta_i$. Tells light from viewer as [`Cosines`](Self::Cosines) does,
+    /// but by an input of its own, so that a network can heed that less than the others.
+    SumDifference,
+    /// $\cos\theta_h$, $\cos\theta_d$, $\cos\theta_i + \cos\theta_o$ and
     /// $\cos\theta_i \cos\theta_o$. Reciprocal.
     ReciprocalCosines,
     /// $\sqrt{\theta_h}$, $\cos\theta_d$, $\cos\theta_i \cos\theta_o$ and
@@ -38,10 +42,11 @@ pub enum Features {
 
 impl Features {
     /// Every set there is.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Paper,
         Self::HalfDiff,
         Self::Cosines,
+        Self::SumDifference,
         Self::ReciprocalCosines,
         Self::Highlight,
     ];
@@ -53,6 +58,7 @@ impl Features {
             Self::Paper => "paper",
             Self::HalfDiff => "half-diff",
             Self::Cosines => "cosines",
+            Self::SumDifference => "sum-difference",
             Self::ReciprocalCosines => "reciprocal-cosines",
             Self::Highlight => "highlight",
         }
@@ -78,6 +84,12 @@ impl Features {
                 "sin theta_i sin theta_o cos dphi",
             ],
             Self::Cosines => &["cos theta_h", "cos theta_d", "cos theta_i", "cos theta_o"],
+            Self::SumDifference => &[
+                "cos theta_h",
+                "cos theta_d",
+                "cos theta_i + cos theta_o",
+                "cos theta_o - cos theta_i",
+            ],
             Self::ReciprocalCosines => &[
                 "cos theta_h",
                 "cos theta_d",
@@ -97,7 +109,7 @@ impl Features {
     /// these inputs is then reciprocal by construction.
     #[must_use]
     pub fn is_reciprocal(self) -> bool {
-        !matches!(self, Self::Paper | Self::Cosines)
+        !matches!(self, Self::Paper | Self::Cosines | Self::SumDifference)
     }
 
     /// The inputs of each pair of directions, shape (pairs, inputs).
@@ -118,6 +130,7 @@ impl Features {
                 Self::Paper => fill(row, &paper(pair)),
                 Self::HalfDiff => fill(row, &half_diff(pair)),
                 Self::Cosines => fill(row, &cosines(pair)),
+                Self::SumDifference => fill(row, &sum_difference(pair)),
                 Self::ReciprocalCosines => fill(row, &reciprocal_cosines(pair)),
                 Self::Highlight => fill(row, &highlight(pair)),
             }
@@ -159,6 +172,11 @@ fn cosines(pair: &Pair) -> [f64; 4] {
         pair.incident[2],
         pair.outgoing[2],
     ]
+}
+
+fn sum_difference(pair: &Pair) -> [f64; 4] {
+    let [cos_h, cos_d, cos_i, cos_o] = cosines(pair);
+    [cos_h, cos_d, cos_i + cos_o, cos_o - cos_i]
 }
 
 fn reciprocal_cosines(pair: &Pair) -> [f64; 4] {
@@ -227,9 +245,10 @@ mod tests {
             incident: direction,
             outgoing: direction,
         };
-        let expected: [(Features, &[f64]); 4] = [
+        let expected: [(Features, &[f64]); 5] = [
             (Features::HalfDiff, &[FRAC_PI_3, 0.0, 1.0, 0.25, 0.75]),
             (Features::Cosines, &[0.5, 1.0, 0.5, 0.5]),
+            (Features::SumDifference, &[0.5, 1.0, 1.0, 0.0]),
             (Features::ReciprocalCosines, &[0.5, 1.0, 1.0, 0.25]),
             (Features::Highlight, &[FRAC_PI_3.sqrt(), 1.0, 0.25, 1.0]),
         ];

@@ -43,6 +43,7 @@ pub mod geometry;
 pub mod link;
 pub mod metrics;
 pub mod model;
+pub mod prior;
 pub mod protocol;
 pub mod published;
 pub mod quality;

@@ -55,7 +55,7 @@ impl Link {
     /// A [`FittedLink`] never returns more than this many times the largest value of its channel
     /// in the training set (identity excepted): where a log target is extrapolated, a small error
     /// of the target would else be a firefly, or infinite.
-    pub const HEADROOM: f64 = 10.0;
+    pub const HEADROOM: f64 = 3.0;
 
     /// [`Link::Log`] with the offset at a tenth of the median.
     #[must_use]
@@ -202,6 +202,34 @@ impl FittedLink {
         &self.channels
     }
 
+    /// Whether a link from outside makes sense: every offset positive and finite, every ceiling
+    /// finite and not negative.
+    ///
+    /// # Errors
+    /// [`elm::Error::Parameter`] for the first that is not.
+    pub(crate) fn check(&self) -> Result<(), elm::Error> {
+        let parameter = |name, value, expected| {
+            Err(elm::Error::Parameter {
+                name,
+                value,
+                expected,
+            })
+        };
+        for channel in &self.channels {
+            let ceiling = match *channel {
+                Channel::Identity => continue,
+                Channel::Log { offset, .. } if !(offset > 0.0 && offset.is_finite()) => {
+                    return parameter("offset of the link", offset, "positive and finite");
+                }
+                Channel::Log { ceiling, .. } | Channel::CubeRoot { ceiling } => ceiling,
+            };
+            if !(ceiling >= 0.0 && ceiling.is_finite()) {
+                return parameter("ceiling of the link", ceiling, "finite and not negative");
+            }
+        }
+        Ok(())
+    }
+
     /// Numbers kept for each channel.
     pub(crate) fn floats_per_channel(&self) -> usize {
         match self.channels.first() {
@@ -287,7 +315,7 @@ mod tests {
             let fitted = link.fit(values.view()).unwrap();
             let targets = array![[-1e300], [-1.0], [0.0], [1e9], [f64::INFINITY]];
             let back = fitted.to_values(targets).unwrap();
-            assert_eq!(back, array![[0.0], [0.0], [0.0], [30.0], [30.0]], "{link}");
+            assert_eq!(back, array![[0.0], [0.0], [0.0], [9.0], [9.0]], "{link}");
         }
     }
 

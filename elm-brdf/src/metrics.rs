@@ -1,12 +1,75 @@
 //! Measures of error of a reflectance model's predictions; every table and file takes them from
 //! here.
 
+use std::fmt;
+use std::str::FromStr;
+
 use elm::metrics;
 use ndarray::{Array1, ArrayView2, Zip};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::geometry::Pair;
+
+/// The measure that a fit makes small.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Metric {
+    /// [`Metrics::rmse`].
+    #[default]
+    Rmse,
+    /// [`Metrics::log_cosine_mae`].
+    LogCosine,
+    /// [`Metrics::cube_root_rmse`].
+    CubeRoot,
+}
+
+impl Metric {
+    /// Every measure there is.
+    pub const ALL: [Self; 3] = [Self::Rmse, Self::LogCosine, Self::CubeRoot];
+
+    /// The measure's name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rmse => "rmse",
+            Self::LogCosine => "log-cosine",
+            Self::CubeRoot => "cube-root",
+        }
+    }
+
+    /// Its value among others.
+    #[must_use]
+    pub fn of(self, metrics: &Metrics) -> f64 {
+        match self {
+            Self::Rmse => metrics.rmse,
+            Self::LogCosine => metrics.log_cosine_mae,
+            Self::CubeRoot => metrics.cube_root_rmse,
+        }
+    }
+}
+
+impl fmt::Display for Metric {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Metric {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|metric| metric.name() == name)
+            .ok_or_else(|| Error::UnknownName {
+                what: "metric",
+                name: name.to_owned(),
+                expected: Self::ALL.map(Self::name).join(", "),
+            })
+    }
+}
 
 /// Measures of error of a set of predictions $f$ against the truth $g$, over all rows and channels
 /// together.

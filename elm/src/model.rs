@@ -108,8 +108,9 @@ impl<A: Scalar> ElmParams<A> {
         std::iter::once(&mut self.neurons).chain(&mut self.others)
     }
 
-    /// Neurons of all kinds.
-    pub(crate) fn neurons(&self) -> usize {
+    /// Number of neurons, of all kinds together.
+    #[must_use]
+    pub fn neurons(&self) -> usize {
         let add = |sum: usize, group: &Neurons<A>| sum.saturating_add(group.count);
         self.groups().fold(0, add)
     }
@@ -306,6 +307,25 @@ impl<A: Scalar> CheckedParams<A> {
             .solver
             .solve(&self.problem(&design, t, weights.as_ref())?)?;
         Ok(Elm::assemble(scaler, hidden, self.0.direct_links, solution))
+    }
+
+    /// The random layer alone, for this many inputs: what a [`fit`](Self::fit) draws. Whoever keeps
+    /// these settings need keep no weights of it; see [`Elm::from_parts`].
+    ///
+    /// # Errors
+    /// [`Error::Empty`] without inputs, [`Error::Shape`] for another number of input scales,
+    /// [`Error::TooLarge`]; [`Error::Conflict`] for neurons that are laid on training rows
+    /// ([`Biases::OnData`], [`Kind::Radial`]), as there are none.
+    pub fn hidden_layer(&self, inputs: usize) -> Result<HiddenLayer<A>> {
+        if self.needs_rows() {
+            return Err(Error::Conflict {
+                first: "neurons laid on training rows",
+                second: "a layer without them",
+            });
+        }
+        let nowhere = Array2::zeros((1, inputs));
+        check_matrix("inputs", nowhere.view())?;
+        self.layer(nowhere.view())
     }
 
     /// Held-out predictions for every row, from one random layer and one factorisation: `folds`

@@ -66,6 +66,49 @@ pub(crate) fn check_layer<A: Scalar>(
     Ok(())
 }
 
+impl<A: Scalar> Elm<A> {
+    /// A network of a given layer and output weights from elsewhere.
+    ///
+    /// `beta` has shape (neurons, outputs) and `intercept` one entry per output. `scaler` is that
+    /// of the training rows, `None` for inputs that are taken as they are.
+    ///
+    /// ```
+    /// use elm::{Elm, ElmParams};
+    /// use ndarray::array;
+    ///
+    /// let (x, t) = (array![[0.0], [1.0], [2.0], [3.0]], array![0.0, 1.0, 4.0, 9.0]);
+    /// let params = ElmParams::new(10).seed(7).check()?;
+    /// let fitted = params.fit(&x, &t)?;
+    /// let again = Elm::from_parts(
+    ///     fitted.scaler().cloned(),
+    ///     params.hidden_layer(1)?,
+    ///     fitted.beta().to_owned(),
+    ///     fitted.intercept().to_owned(),
+    /// )?;
+    /// assert_eq!(again.predict(&x)?, fitted.predict(&x)?);
+    /// # Ok::<(), elm::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Shape`], [`Error::Empty`] and [`Error::NotFinite`] for parts that do not fit.
+    pub fn from_parts(
+        scaler: Option<Scaler<A>>,
+        hidden: HiddenLayer<A>,
+        beta: Array2<A>,
+        intercept: Array1<A>,
+    ) -> Result<Self> {
+        let diagnosis = Diagnosis::of_given(beta.view());
+        Self::try_from(Parts {
+            scaler,
+            hidden,
+            direct_links: false,
+            beta,
+            intercept,
+            diagnosis,
+        })
+    }
+}
+
 impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
     type Error = Error;
 

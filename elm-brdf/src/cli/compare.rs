@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use elm::solve::{PseudoInverse, Ridge};
 use elm::{Activation, ElmParams};
-use elm_datasets::{Measurements, Origin};
+use elm_datasets::{Invalid, Measurements, Origin};
 use ndarray::{ArrayView2, Axis};
 
 use super::common::{hint, one_of, progress, usage};
@@ -18,8 +18,9 @@ use crate::error::Error;
 use crate::features::Features;
 use crate::geometry::{Pair, pairs};
 use crate::link::Link;
-use crate::model::BrdfParams;
-use crate::protocol::{Folds, MaterialScores, cross_validate, cross_validate_samples};
+use crate::model::{BrdfParams, Tuned};
+use crate::prior::PriorParams;
+use crate::protocol::{Folds, MaterialScores, cross_validate, cross_validate_pooled, cross_validate_samples};
 use crate::reference::{self, Growth, Reference};
 use crate::report::plot::{self, Shown};
 use crate::report::{Comparison, Data, Entry, Format, Words};
@@ -93,6 +94,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut entries = Vec::new();
     let mut best: Option<(f64, String, Vec<MaterialScores>)> = None;
     for index in 0..names.len() {
+        if names[index].name == POOLED && matches!(subject, Subject::Samples(_)) {
+            // One material has no others.
+            progress.inc(seeds.len() as u64);
+            continue;
+        }
         let mut runs = Vec::new();
         let fitting = Instant::now();
         for &seed in &seeds {
@@ -100,7 +106,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 .swap_remove(index)
                 .affordable(seed);
             let folds = Folds::new(subject.rows(), arguments.folds, seed).map_err(usage)?;
-            runs.push(subject.cross_validate(model.method.as_ref(), &folds)?);
+            runs.push(if model.name == POOLED {
+                subject.pooled(seed, arguments.reading.invalid, &folds)?
+            } else {
+                subject.cross_validate(model.method.as_ref(), &folds)?
+            });
             progress.inc(1);
         }
         let entry = subject.entry(&names[index], fitting, arguments.folds, &runs)?;
@@ -151,6 +161,24 @@ impl Subject {
                 vec![scores]
             }
         })
+    }
+
+    /// Each material with a prior from all others that its source has.
+    fn pooled(
+        &self,
+        seed: u64,
+        invalid: Invalid,
+        folds: &Folds,
+    ) -> Result<Vec<MaterialScores>, Failure> {
+        let Self::Materials(source, data) = self else {
+            return Ok(Vec::new());
+        };
+        let pool = source.load(&source.select("all")?, invalid)?;
+        let params = PriorParams {
+            seed,
+            ..PriorParams::default()
+        };
+        Ok(cross_validate_pooled(&params, &pool, data, folds, |_, _| {})?)
     }
 
     fn data(&self, scores: &[MaterialScores]) -> Data {
@@ -237,6 +265,25 @@ impl Subject {
     }
 }
 
+/// Everything chosen by held-out errors, each material by itself.
+const TUNED: &str = "elm (tuned)";
+/// The same with a prior from the other materials.
+const POOLED: &str = "elm (prior)";
+
+fn tuned(name: &str, seed: u64) -> Reference {
+    Reference {
+        name: name.to_owned(),
+        features: Some(Features::SumDifference),
+        link: Some(Link::default_log()),
+        growth: Growth::Linear,
+        network: true,
+        method: Box::new(Tuned {
+            seed,
+            ..Tuned::default()
+        }),
+    }
+}
+
 /// The models of these names, on all the inputs and targets that they come with.
 fn select(list: &str, seed: u64) -> Result<Vec<Reference>, Failure> {
     let mut models: Vec<Reference> = reference::all().into_iter().chain(networks(seed)).collect();
@@ -262,7 +309,7 @@ fn select(list: &str, seed: u64) -> Result<Vec<Reference>, Failure> {
 }
 
 /// The paper's network, and the same idea with inputs, target and ridge that suit the task.
-fn networks(seed: u64) -> [Reference; 2] {
+fn networks(seed: u64) -> [Reference; 4] {
     let network = |neurons: usize| ElmParams::new(neurons).seed(seed);
     let reference = |name: &str, params: BrdfParams| Reference {
         name: name.to_owned(),
@@ -295,5 +342,15 @@ fn networks(seed: u64) -> [Reference; 2] {
                     .solver(Ridge::leave_one_out()),
             },
         ),
+        tuned(TUNED, seed),
+        // What is fitted to count its numbers: a network without the prior, of as many neurons.
+        Reference {
+            method: Box::new(Tuned {
+                neurons: Some(PriorParams::default().neurons),
+                seed,
+                ..Tuned::default()
+            }),
+            ..tuned(POOLED, seed)
+        },
     ]
 }

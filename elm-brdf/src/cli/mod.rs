@@ -4,10 +4,13 @@
 mod common;
 mod compare;
 mod data;
+mod eval;
 mod export;
 #[cfg(feature = "fetch")]
 mod fetch;
+mod fit;
 mod gallery;
+mod prior;
 mod render;
 mod reproduce;
 mod samples;
@@ -32,6 +35,9 @@ struct Arguments {
 enum Command {
     Reproduce(reproduce::Arguments),
     Compare(compare::Arguments),
+    Fit(fit::Arguments),
+    Eval(eval::Arguments),
+    Prior(prior::Arguments),
     #[cfg(feature = "fetch")]
     Fetch(fetch::Arguments),
     Render(render::Arguments),
@@ -69,6 +75,9 @@ pub fn run() -> ExitCode {
     let outcome = match Arguments::try_parse() {
         Ok(Arguments { command }) => match command {
             Command::Reproduce(arguments) => reproduce::run(&arguments),
+            Command::Fit(arguments) => fit::run(&arguments),
+            Command::Eval(arguments) => eval::run(&arguments),
+            Command::Prior(arguments) => prior::run(&arguments),
             Command::Render(arguments) => render::run(&arguments),
             Command::Export(arguments) => export::run(&arguments),
             Command::Gallery(arguments) => gallery::run(&arguments),

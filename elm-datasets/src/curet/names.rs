@@ -69,6 +69,26 @@ impl MaterialId {
         usize::from(self.0) - 1
     }
 
+    /// The material that this one is a second measurement of, nearer to the camera; itself where it
+    /// is none. Where materials are pooled, both must stand on one side of every division.
+    ///
+    /// ```
+    /// use elm_datasets::MaterialId;
+    /// assert_eq!(MaterialId::new(29)?.specimen(), MaterialId::new(2)?);
+    /// assert_eq!(MaterialId::new(39)?.specimen(), MaterialId::new(39)?);
+    /// # Ok::<(), elm_datasets::Error>(())
+    /// ```
+    #[must_use]
+    pub fn specimen(self) -> Self {
+        Self(match self.0 {
+            29 => 2,
+            30 => 11,
+            31 => 12,
+            32 => 14,
+            own => own,
+        })
+    }
+
     /// CUReT's name for it.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -12,7 +12,7 @@ use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut2, Axis, s};
 use serde::{Deserialize, Serialize};
 
 use crate::activation::Activation;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 use crate::solve::{check_length, check_matrix};
 
@@ -118,6 +118,42 @@ impl<A: Scalar> HiddenLayer<A> {
             group.activation.apply_in_place(z.view_mut());
             to.assign(&z);
         }
+    }
+
+    /// The layer of these neurons, given by rising numbers, such as those that
+    /// [pruning](crate::prune) keeps.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a number that is not there, or does not rise.
+    pub fn subset(&self, neurons: &[usize]) -> Result<Self> {
+        let rising = neurons.windows(2).all(|pair| pair[0] < pair[1]);
+        match neurons.last() {
+            Some(&last) if !rising || last >= self.neurons() => Err(Error::Parameter {
+                name: "neuron kept",
+                value: last as f64,
+                expected: "rising numbers, each below the number of neurons",
+            }),
+            _ => Ok(self.select(neurons)),
+        }
+    }
+
+    /// The neurons of several layers as one layer, those of one function side by side, in their
+    /// order otherwise.
+    ///
+    /// # Errors
+    /// [`Error::Empty`] of none, [`Error::Shape`] for layers of different inputs.
+    pub fn joined(layers: &[Self]) -> Result<Self> {
+        let Some(first) = layers.first() else {
+            return Err(Error::Empty {
+                what: "layers",
+                rows: 0,
+                columns: 0,
+            });
+        };
+        for layer in layers {
+            check_length("inputs of a layer", layer.inputs(), first.inputs())?;
+        }
+        Ok(Self::join(&layers.iter().collect::<Vec<_>>()).0)
     }
 
     /// The layer of these neurons, given by rising numbers.

@@ -1,6 +1,10 @@
 //! What a solver reports beside the weights.
 
+use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
+
+use super::spectrum::norm;
+use crate::scalar::Scalar;
 
 /// How a solver came to its answer; [`Reason`] says why so.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -17,6 +21,8 @@ pub enum Route {
     Gram,
     /// Cholesky of $H H^T$ with ridge's $\lambda$ on the diagonal, for fewer rows than neurons.
     DualGram,
+    /// None: the weights were given.
+    Given,
 }
 
 /// Why a solver took its [`Route`]. Between the two forms of a route the shape of the matrix
@@ -40,6 +46,8 @@ pub enum Reason {
     WeakRidge,
     /// It is the mean of several networks, each with an answer of its own.
     Mean,
+    /// Nothing was solved: the weights come from elsewhere.
+    GivenWeights,
 }
 
 /// The state of the problem that was solved, for the user to judge the answer by.
@@ -59,7 +67,7 @@ pub struct Diagnosis {
     /// Largest over smallest singular value counted in [`rank`](Self::rank), 1 at rank 0; `None`
     /// with it.
     pub condition: Option<f64>,
-    /// The largest singular value.
+    /// The largest singular value; 0 where nothing was factorised.
     pub largest_singular_value: f64,
     /// The smallest singular value counted in [`rank`](Self::rank); `None` with it.
     pub smallest_singular_value: Option<f64>,
@@ -74,4 +82,24 @@ pub struct Diagnosis {
     /// Leave-one-out root mean squared error, where the solver computed it; with what rounding is
     /// expected to add to it (see [`Ridge`](crate::solve::Ridge)).
     pub leave_one_out: Option<Vec<f64>>,
+}
+
+impl Diagnosis {
+    /// Of output weights that were given, not solved for.
+    pub(crate) fn of_given<A: Scalar>(beta: ArrayView2<'_, A>) -> Self {
+        let outputs = beta.ncols();
+        Self {
+            route: Route::Given,
+            reason: Reason::GivenWeights,
+            rank: None,
+            condition: None,
+            largest_singular_value: 0.0,
+            smallest_singular_value: None,
+            lambda: vec![0.0; outputs],
+            degrees_of_freedom: vec![0.0; outputs],
+            residual_norm: vec![0.0; outputs],
+            beta_norm: beta.columns().into_iter().map(norm).collect(),
+            leave_one_out: None,
+        }
+    }
 }

@@ -1,0 +1,149 @@
+//! `elm-brdf eval`: how well a saved model meets measurements.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::common::{load, one_of};
+use super::samples::{Material, Reading};
+use super::{Failure, print};
+use crate::brdf::Brdf;
+use crate::error::Error;
+use crate::geometry::pairs;
+use crate::metrics::Metrics;
+use crate::model::BrdfModel;
+
+/// Judge a saved model by measurements.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// A file that 'fit' has written.
+    model: PathBuf,
+    /// A file (.csv, MERL .binary, RGL .bsdf, pbrt-v2 .brdf), or 'curet:NAME'.
+    samples: String,
+    /// Form of the output.
+    #[arg(long, value_name = "FORM", default_value = "table",
+          value_parser = one_of::<Format>(Format::ALL.map(Format::name)))]
+    format: Format,
+    #[command(flatten)]
+    reading: Reading,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Table,
+    Json,
+    Csv,
+}
+
+impl Format {
+    const ALL: [Self; 3] = [Self::Table, Self::Json, Self::Csv];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Table => "table",
+            Self::Json => "json",
+            Self::Csv => "csv",
+        }
+    }
+}
+
+impl std::str::FromStr for Format {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self, Error> {
+        Self::ALL
+            .into_iter()
+            .find(|format| format.name() == name)
+            .ok_or_else(|| Error::UnknownName {
+                what: "form",
+                name: name.to_owned(),
+                expected: Self::ALL.map(Self::name).join(", "),
+            })
+    }
+}
+
+/// The JSON form, field for field.
+#[derive(Debug, Serialize)]
+struct Evaluation {
+    rows: usize,
+    channels: Vec<String>,
+    stored_floats: usize,
+    neurons: usize,
+    metrics: Metrics,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let model: BrdfModel = load(&arguments.model)?;
+    let Material {
+        samples, source, ..
+    } = arguments.reading.read(&arguments.samples)?;
+    if model.channels() != samples.channels.len() {
+        return Err(Failure::Failed(Error::Elm(elm::Error::Shape {
+            what: "channels of the samples",
+            expected: model.channels(),
+            found: samples.channels.len(),
+        })));
+    }
+    let pairs = pairs(&samples.directions);
+    let predicted = model.eval(&pairs)?;
+    let evaluation = Evaluation {
+        rows: pairs.len(),
+        metrics: Metrics::of(&pairs, predicted.view(), samples.values.view())?,
+        channels: samples.channels,
+        stored_floats: model.stored_floats(),
+        neurons: model.network().hidden().neurons(),
+    };
+    print(&evaluation.render(arguments.format, &source)?)
+}
+
+impl Evaluation {
+    fn measures(&self) -> [(&'static str, Option<f64>); 6] {
+        let m = &self.metrics;
+        [
+            ("rmse", Some(m.rmse)),
+            ("mae", Some(m.mae)),
+            ("correlation", m.correlation),
+            ("relative_rmse", m.relative_rmse),
+            ("log_cosine_mae", Some(m.log_cosine_mae)),
+            ("cube_root_rmse", Some(m.cube_root_rmse)),
+        ]
+    }
+
+    fn render(&self, format: Format, source: &str) -> Result<String, Failure> {
+        let number = |value: Option<f64>| value.map_or_else(String::new, |v| format!("{v}"));
+        Ok(match format {
+            Format::Json => {
+                let text = serde_json::to_string_pretty(self).map_err(|reason| {
+                    Failure::Failed(Error::Write {
+                        path: "standard output".into(),
+                        reason: reason.into(),
+                    })
+                })?;
+                format!("{text}\n")
+            }
+            Format::Csv => {
+                let names = self.measures().map(|(name, _)| name).join(",");
+                let values = self.measures().map(|(_, value)| number(value)).join(",");
+                format!(
+                    "rows,stored_floats,neurons,{names}\n{},{},{},{values}\n",
+                    self.rows, self.stored_floats, self.neurons
+                )
+            }
+            Format::Table => {
+                let mut text = format!(
+                    "{} rows of {source}, channels {}\n{} neurons, {} stored numbers\n",
+                    self.rows,
+                    self.channels.join(", "),
+                    self.neurons,
+                    self.stored_floats
+                );
+                for (name, value) in self.measures() {
+                    let value = value.map_or_else(|| "-".to_owned(), |v| format!("{v:.5}"));
+                    text.push_str(&format!("{name:<16}{value:>10}\n"));
+                }
+                text
+            }
+        })
+    }
+}

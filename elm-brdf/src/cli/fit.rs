@@ -1,0 +1,114 @@
+//! `elm-brdf fit`: a model of one's own measurements, in a file.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+
+use super::common::{load, one_of, usage};
+use super::samples::{Material, Reading};
+use super::{Failure, print};
+use crate::error::Error;
+use crate::features::Features;
+use crate::geometry::pairs;
+use crate::metrics::Metric;
+use crate::model::{BrdfModel, Tuned};
+use crate::prior::Prior;
+
+/// Fit a network to measurements and save it as one file.
+///
+/// What is not given is chosen by held-out errors. The file holds the output weights and what draws
+/// the random layer again, with where the model comes from and how good it is.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// A file (.csv, MERL .binary, RGL .bsdf, pbrt-v2 .brdf), or 'curet:NAME'.
+    samples: String,
+    /// The model's file: JSON for a name ending in .json, else binary.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Hidden neurons; chosen by the number of measurements if not given.
+    #[arg(long, value_name = "N", conflicts_with = "prior")]
+    neurons: Option<usize>,
+    /// The most numbers that the model may store.
+    #[arg(long, value_name = "N", conflicts_with = "prior")]
+    max_floats: Option<usize>,
+    /// Inputs of the network; chosen if not given.
+    #[arg(long, value_name = "NAME", conflicts_with = "prior",
+          value_parser = one_of::<Features>(Features::ALL.map(Features::name)))]
+    features: Option<Features>,
+    /// The held-out error that is made small.
+    #[arg(long, value_name = "NAME", default_value = "rmse",
+          value_parser = one_of::<Metric>(Metric::ALL.map(Metric::name)))]
+    metric: Metric,
+    /// What other materials teach: a file that 'prior build' has written.
+    #[arg(long, value_name = "FILE")]
+    prior: Option<PathBuf>,
+    /// Seed of random layers and of rows drawn.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    reading: Reading,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.neurons == Some(0) {
+        return Err(usage("--neurons is 0, expected at least 1"));
+    }
+    let Material {
+        samples, source, ..
+    } = arguments.reading.read(&arguments.samples)?;
+    let prior: Option<Prior> = match &arguments.prior {
+        Some(path) => Some(load(path)?),
+        None => None,
+    };
+    let start = Instant::now();
+    let pairs = pairs(&samples.directions);
+    let values = samples.values.view();
+    let model = match prior {
+        Some(prior) => prior.fit_model(&pairs, values, arguments.metric)?,
+        None => Tuned {
+            features: arguments.features,
+            metric: arguments.metric,
+            neurons: arguments.neurons,
+            max_floats: arguments.max_floats,
+            seed: arguments.seed,
+        }
+        .fit_model(&pairs, values)?,
+    };
+    let seconds = start.elapsed().as_secs_f64();
+    let mut about = model.provenance().clone();
+    about.data = source;
+    about.channels = samples.channels;
+    let model = model.with_provenance(about);
+    model.save(&arguments.output).map_err(Error::from)?;
+    print(&describe(&model, seconds, arguments))
+}
+
+fn describe(model: &BrdfModel, seconds: f64, arguments: &Arguments) -> String {
+    let about = model.provenance();
+    let mut text = format!(
+        "{} measurements of {}, channels {}\n\
+         {} neurons on '{}', {} stored numbers, fitted in {seconds:.3} s\n",
+        about.rows,
+        about.data,
+        about.channels.join(", "),
+        model.network().hidden().neurons(),
+        model.features(),
+        model.stored_floats(),
+    );
+    if let Some(prior) = &about.prior {
+        text.push_str(&format!("prior: {prior}\n"));
+    }
+    if let Some(errors) = &about.held_out {
+        text.push_str(&format!(
+            "held out when settings were chosen: RMSE {:.5}, MAE {:.5}, log-cosine {:.5}, \
+             cube root {:.5}\n",
+            errors.rmse, errors.mae, errors.log_cosine_mae, errors.cube_root_rmse
+        ));
+    }
+    if let Some(floor) = about.noise_floor {
+        text.push_str(&format!("noise of the measurements: {floor:.5} 1/sr\n"));
+    }
+    text.push_str(&format!("written to {}\n", arguments.output.display()));
+    text
+}

@@ -1,0 +1,87 @@
+//! A model as its file has it: what was chosen and fitted, and nothing that can be made again.
+
+use elm::persist::{self, Persist};
+use elm::{Activation, Elm, Scaler};
+use ndarray::{Array1, Array2};
+use serde::{Deserialize, Serialize};
+
+use super::{BrdfModel, Layer, Provenance};
+use crate::features::Features;
+use crate::link::FittedLink;
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct File {
+    provenance: Provenance,
+    features: Features,
+    link: FittedLink,
+    layer: Layer,
+    scaler: Option<Scaler<f64>>,
+    beta: Array2<f64>,
+    intercept: Array1<f64>,
+}
+
+impl From<BrdfModel> for File {
+    fn from(model: BrdfModel) -> Self {
+        Self {
+            provenance: model.provenance,
+            features: model.features,
+            link: model.link,
+            layer: model.layer,
+            scaler: model.network.scaler().cloned(),
+            beta: model.network.beta().to_owned(),
+            intercept: model.network.intercept().to_owned(),
+        }
+    }
+}
+
+impl TryFrom<File> for BrdfModel {
+    type Error = elm::Error;
+
+    fn try_from(file: File) -> Result<Self, elm::Error> {
+        let inputs = file.features.inputs().len();
+        let hidden = file.layer.hidden(inputs, file.beta.nrows())?;
+        let network = Elm::from_parts(file.scaler, hidden, file.beta, file.intercept)?;
+        for (what, expected, found) in [
+            ("inputs of the network", inputs, network.inputs()),
+            (
+                "channels of the link",
+                network.outputs(),
+                file.link.channels(),
+            ),
+        ] {
+            if expected != found {
+                return Err(elm::Error::Shape {
+                    what,
+                    expected,
+                    found,
+                });
+            }
+        }
+        file.link.check()?;
+        Ok(Self {
+            provenance: file.provenance,
+            features: file.features,
+            link: file.link,
+            layer: file.layer,
+            network,
+        })
+    }
+}
+
+impl Persist for BrdfModel {
+    const KIND: &'static str = "elm-brdf model";
+    const SCALAR: &'static str = "f64";
+
+    fn check(&self) -> Result<(), persist::Error> {
+        let groups = self.network.hidden().groups();
+        match groups
+            .iter()
+            .find(|g| matches!(g.activation(), Activation::Custom(_)))
+        {
+            Some(group) => Err(persist::Error::CustomActivation {
+                name: group.activation().name().to_owned(),
+            }),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! An extreme learning machine as a reflectance model: features, link and network.
+//!
+//! [`BrdfParams`] are settings, all of them the caller's; [`Tuned`] chooses what it is not told.
+//! Both make a [`BrdfModel`], which [`save`](BrdfModel::save) keeps in a file.
+//!
+//! # Where nothing was measured
+//! Below either horizon a model is black. Between the last measured angle and grazing it goes on as
+//! its network does, which for inputs that are bounded (all sets are) is a bounded continuation; the
+//! [link](crate::link) keeps it between 0 and [`Link::HEADROOM`](crate::link::Link::HEADROOM) times
+//! the largest value measured. It is finite for every pair of directions.
+
+mod file;
+mod layer;
+mod tuned;
+
+use std::path::Path;
+
+use elm::{Elm, ElmParams, persist};
+use ndarray::{Array2, ArrayView2};
+use serde::{Deserialize, Serialize};
+
+use crate::brdf::{Brdf, Fit, check, check_directions};
+use crate::error::Result;
+use crate::features::Features;
+use crate::geometry::Pair;
+use crate::link::{FittedLink, Link};
+use crate::metrics::{Metric, Metrics};
+pub use layer::{Draw, Layer};
+pub use tuned::Tuned;
+pub(crate) use tuned::{SideBySide, without_weights};
+
+/// What a [`BrdfModel`] is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BrdfParams {
+    /// Inputs of the network.
+    pub features: Features,
+    /// Targets of the network.
+    pub link: Link,
+    /// The network.
+    pub network: ElmParams<f64>,
+}
+
+/// A fitted reflectance model.
+///
+/// ```
+/// use elm::{ElmParams, solve::PseudoInverse};
+/// use elm_brdf::{brdf::{Brdf, Fit}, features::Features, geometry::pairs, link::Link};
+/// use elm_brdf::model::BrdfParams;
+/// use elm_datasets::{Invalid, MaterialId, synthetic};
+///
+/// let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
+/// let samples = data.samples(0).ok_or("no such material")?;
+/// let params = BrdfParams {
+///     features: Features::Paper,
+///     link: Link::Identity,
+///     network: ElmParams::new(50).solver(PseudoInverse::default()).intercept(false),
+/// };
+/// let pairs = pairs(&samples.directions);
+/// let model = params.fit(&pairs, samples.values.view())?;
+/// assert_eq!(model.eval(&pairs)?.dim(), (205, 3));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "file::File", into = "file::File")]
+pub struct BrdfModel {
+    features: Features,
+    link: FittedLink,
+    layer: Layer,
+    network: Elm<f64>,
+    provenance: Provenance,
+}
+
+/// Where a model comes from and how good it is.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Provenance {
+    /// What was fitted: a file, a material.
+    pub data: String,
+    /// Name of each channel.
+    pub channels: Vec<String>,
+    /// Number of measurements.
+    pub rows: usize,
+    /// Seed of the random layer and of whatever else was drawn.
+    pub seed: u64,
+    /// The measure that settings were chosen by; `None` where all were given.
+    pub metric: Option<Metric>,
+    /// Errors on measurements that were held out when settings had been chosen; `None` where none
+    /// were.
+    pub held_out: Option<Metrics>,
+    /// Standard deviation of the measurements' noise in 1/sr, from pairs that are reciprocal to
+    /// each other; `None` where there are none.
+    pub noise_floor: Option<f64>,
+    /// The prior that the fit leans on.
+    pub prior: Option<String>,
+}
+
+impl BrdfModel {
+    /// Puts a model together; `network` must have the layer that `layer` draws.
+    pub(crate) fn new(
+        features: Features,
+        link: FittedLink,
+        layer: Layer,
+        network: Elm<f64>,
+    ) -> Self {
+        Self {
+            features,
+            link,
+            layer,
+            network,
+            provenance: Provenance::default(),
+        }
+    }
+
+    /// The inputs of the network.
+    #[must_use]
+    pub fn features(&self) -> Features {
+        self.features
+    }
+
+    /// What turns the network's outputs into BRDF values.
+    #[must_use]
+    pub fn link(&self) -> &FittedLink {
+        &self.link
+    }
+
+    /// The fitted network.
+    #[must_use]
+    pub fn network(&self) -> &Elm<f64> {
+        &self.network
+    }
+
+    /// Where the model comes from.
+    #[must_use]
+    pub fn provenance(&self) -> &Provenance {
+        &self.provenance
+    }
+
+    /// The same model with another account of where it comes from.
+    #[must_use]
+    pub fn with_provenance(mut self, provenance: Provenance) -> Self {
+        self.provenance = provenance;
+        self
+    }
+
+    /// All numbers that a file must hold to evaluate the model: output weights, constants, scales,
+    /// links, which neurons were kept (32 to a number), but no weights that a seed regenerates.
+    #[must_use]
+    pub fn stored_floats(&self) -> usize {
+        let scaler = self.network.scaler().map_or(0, |s| 2 * s.mean().len());
+        self.network.beta().len()
+            + self.network.outputs()
+            + scaler
+            + self.link.channels() * self.link.floats_per_channel()
+            + self.layer.stored_floats()
+    }
+
+    /// Writes the model to a file, whole or not at all: JSON for a name ending in `.json`, else
+    /// compact and checksummed.
+    ///
+    /// # Errors
+    /// [`persist::Error`] naming the file, or for a network with a function of the user's own.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), persist::Error> {
+        persist::save(self, path)
+    }
+
+    /// Reads a model of either form.
+    ///
+    /// # Errors
+    /// [`persist::Error`] for a file that is none, damaged, or of a later version.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, persist::Error> {
+        persist::load(path)
+    }
+}
+
+impl BrdfParams {
+    /// As [`Fit::fit`], with the model itself for an answer.
+    ///
+    /// # Errors
+    /// Where these measurements cannot be fitted.
+    pub fn fit_model(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<BrdfModel> {
+        check(pairs, values)?;
+        let x = self.features.compute(pairs);
+        let link = self.link.fit(values)?;
+        let t = link.to_targets(values)?;
+        let network = self.network.fit(&x, &t)?;
+        let layer = Layer::of(&self.network, network.hidden());
+        Ok(BrdfModel::new(self.features, link, layer, network))
+    }
+}
+
+impl Fit for BrdfParams {
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+        Ok(Box::new(self.fit_model(pairs, values)?))
+    }
+}
+
+impl Brdf for BrdfModel {
+    fn channels(&self) -> usize {
+        self.network.outputs()
+    }
+
+    fn multiply_adds(&self) -> usize {
+        let neurons = self.network.hidden().neurons();
+        neurons * (self.network.inputs() + self.network.outputs())
+    }
+
+    fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
+        check_directions(pairs)?;
+        let targets = self.network.predict(&self.features.compute(pairs))?;
+        let mut values = self.link.to_values(targets)?;
+        for (mut row, pair) in values.rows_mut().into_iter().zip(pairs) {
+            if !pair.is_above_horizon() {
+                row.fill(0.0);
+            }
+        }
+        Ok(values)
+    }
+
+    fn as_network(&self) -> Option<&BrdfModel> {
+        Some(self)
+    }
+
+    fn floats_per_channel(&self) -> usize {
+        // What channels share counts whole for each.
+        let outputs = self.network.outputs().max(1);
+        let own = self.network.beta().nrows() + 1 + self.link.floats_per_channel();
+        own + self.stored_floats() - own * outputs
+    }
+}

@@ -1,0 +1,432 @@
+//! What other materials teach about a new one.
+//!
+//! Materials measured at the same directions are alike: most are brighter towards grazing, most have
+//! their highlight where light is mirrored, and the rig's own errors are the same for all. A
+//! [`Prior`] is a normal distribution of output weights over one hidden layer, its mean and
+//! covariance those of the networks fitted to the other materials. Fitted with it, a new material
+//! needs fewer measurements, and is still one network, defined for every pair of directions and as
+//! cheap to evaluate as without.
+//!
+//! # How
+//! With $H$ the hidden-layer matrix, $\beta_m$ the output weights of $M$ other materials, $\mu$ their
+//! mean and $B = (\beta_1 - \mu, \dots) / \sqrt M$, the new material's are
+//! $$\beta = \mu + B z + \rho\, w, \qquad z \sim N(0, \sigma^2), \quad w \sim N(0, \sigma^2)$$
+//! with one coordinate $z$ for each other material and one $w$ for each neuron, so that nothing is
+//! impossible, only unlikely. That is ridge regression of what $H \mu$ leaves on the columns
+//! $[H B, \rho H]$. Its strength and $\rho$ (relative to the size of $B$) are chosen by exact
+//! leave-one-out.
+//!
+//! Targets are logarithms relative to each material's own median, so that a prior knows shapes, and
+//! brightness does not matter.
+
+use elm::persist::Persist;
+use elm::solve::{LeastSquares, Ridge, Solver};
+use elm::validate::Validator;
+use elm::{Activation, Biases, Distribution, Elm, ElmParams, Neurons, Scaler};
+use ndarray::{Array1, Array2, ArrayView2, Axis, concatenate};
+use serde::{Deserialize, Serialize};
+
+use crate::brdf::{Brdf, Fit, check};
+use crate::error::{Error, Result};
+use crate::features::Features;
+use crate::geometry::Pair;
+use crate::link::Link;
+use crate::metrics::{Metric, Metrics};
+use crate::model::{BrdfModel, Draw, Layer, SideBySide, without_weights};
+
+/// How a [`Prior`] is built.
+///
+/// | name | default | purpose |
+/// |---|---|---|
+/// | `features` | [`Features::SumDifference`] | inputs |
+/// | `neurons` | 256 | size of the layer, and of every network fitted with the prior; more than directions, so that it follows each material |
+/// | `seed` | 1 | the layer |
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PriorParams {
+    /// Inputs of the network.
+    pub features: Features,
+    /// Neurons.
+    pub neurons: usize,
+    /// Seed of the layer.
+    pub seed: u64,
+}
+
+impl Default for PriorParams {
+    fn default() -> Self {
+        Self {
+            features: Features::SumDifference,
+            neurons: 256,
+            seed: 1,
+        }
+    }
+}
+
+/// A distribution of networks, learnt from materials.
+///
+/// ```
+/// use elm_brdf::{brdf::Fit, geometry::pairs, prior::PriorParams};
+/// use elm_datasets::{Invalid, MaterialId, synthetic};
+/// use ndarray::{Axis, concatenate};
+///
+/// let ids: Vec<MaterialId> = MaterialId::all().take(12).collect();
+/// let data = synthetic::measurements(1, &ids, Invalid::Clamp);
+/// let pairs = pairs(&data.directions);
+/// // The first channel of all materials but the first.
+/// let others: Vec<_> = data.materials[1..].iter().map(|m| m.values.slice(s![.., ..1])).collect();
+/// let prior = PriorParams::default().build(&pairs, concatenate(Axis(1), &others)?.view())?;
+/// // Twenty measurements of the first.
+/// let few = data.materials[0].values.slice(s![..200;10, ..1]);
+/// let at: Vec<_> = pairs.iter().step_by(10).copied().take(20).collect();
+/// let model = prior.fit(&at, few)?;
+/// assert_eq!(model.eval(&pairs)?.dim(), (205, 1));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "File", into = "File")]
+pub struct Prior {
+    features: Features,
+    params: ElmParams<f64>,
+    layer: Elm<f64>,
+    mean: Weights<Array1<f64>>,
+    /// $B$, one column for each material.
+    deviations: Weights<Array2<f64>>,
+    source: String,
+}
+
+/// Output weights, one row for each neuron, and constants.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Weights<A> {
+    beta: A,
+    constant: Array1<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct File {
+    source: String,
+    features: Features,
+    params: ElmParams<f64>,
+    scaler: Option<Scaler<f64>>,
+    mean: Weights<Array1<f64>>,
+    deviations: Weights<Array2<f64>>,
+}
+
+/// The strength that other materials' networks are fitted with, relative to the largest squared
+/// singular value: weak, since the covariance smooths.
+const SMOOTHING: f64 = 1e-6;
+/// Sizes of the general part tried, as variances relative to the part that materials teach.
+const GENERAL: [f64; 3] = [0.003, 0.03, 0.3];
+
+impl PriorParams {
+    /// Learns from `values` (BRDF in 1/sr, shape (pairs, materials)), all measured at `pairs`.
+    ///
+    /// # Errors
+    /// Where these materials cannot be fitted; [`elm::Error::Shape`] of a single material, which has
+    /// no spread.
+    pub fn build(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Prior> {
+        check(pairs, values)?;
+        if values.ncols() < 2 {
+            return Err(Error::Elm(elm::Error::Shape {
+                what: "materials of a prior",
+                expected: 2,
+                found: values.ncols(),
+            }));
+        }
+        let x = self.features.compute(pairs);
+        let scaler = Scaler::measured(&x)?;
+        let params = self.params(x.ncols());
+        let hidden = params.clone().check()?.hidden_layer(x.ncols())?;
+        let layer = without_weights(&scaler, hidden)?;
+        let h = layer.hidden_matrix(&x)?;
+        let targets = Link::default_log().fit(values)?.to_targets(values)?;
+        let problem = LeastSquares::new(&h, &targets)?.intercept(true);
+        let solution = Solver::from(Ridge::relative(SMOOTHING)).solve(&problem)?;
+        let mut prior = Prior {
+            features: self.features,
+            params,
+            layer,
+            mean: Weights {
+                beta: Array1::zeros(0),
+                constant: Array1::zeros(1),
+            },
+            deviations: Weights {
+                beta: solution.beta,
+                constant: solution.intercept,
+            },
+            source: String::new(),
+        };
+        prior.centre();
+        Ok(prior)
+    }
+
+    fn params(&self, inputs: usize) -> ElmParams<f64> {
+        // Three scales about that at which a weighted sum of standardised inputs has a deviation
+        // of 1.
+        let third = self.neurons / 3;
+        let phase = Biases::Scaled(std::f64::consts::PI);
+        let waves = |scale: f64| {
+            Neurons::new(third, Activation::Sine)
+                .scale(scale)
+                .biases(phase)
+        };
+        let params = ElmParams::new(self.neurons - 2 * third)
+            .activation(Activation::Sine)
+            .distribution(Distribution::Normal)
+            .biases(phase)
+            .scale(1.0 / (inputs as f64).sqrt())
+            .seed(self.seed);
+        if third == 0 {
+            return params;
+        }
+        params.and(waves(0.3)).and(waves(3.0))
+    }
+}
+
+impl Prior {
+    /// From the weights of materials in `deviations` to mean and deviations.
+    fn centre(&mut self) {
+        let Weights { beta, constant } = &mut self.deviations;
+        let count = beta.ncols() as f64;
+        let mean = beta.sum_axis(Axis(1)) / count;
+        let level = constant.sum() / count;
+        *beta -= &mean.view().insert_axis(Axis(1));
+        *beta /= count.sqrt();
+        constant.mapv_inplace(|c| (c - level) / count.sqrt());
+        self.mean = Weights {
+            beta: mean,
+            constant: Array1::from_elem(1, level),
+        };
+    }
+
+    /// The prior that the other materials alone have: without those at `places` in the order that
+    /// it was built from.
+    ///
+    /// # Errors
+    /// [`elm::Error::Shape`] where fewer than two are left.
+    pub fn without(&self, places: &[usize]) -> Result<Self> {
+        let all = self.materials();
+        let left: Vec<usize> = (0..all).filter(|place| !places.contains(place)).collect();
+        if left.len() < 2 {
+            return Err(Error::Elm(elm::Error::Shape {
+                what: "materials of a prior",
+                expected: 2,
+                found: left.len(),
+            }));
+        }
+        let root = (all as f64).sqrt();
+        let beta = self.deviations.beta.select(Axis(1), &left) * root
+            + self.mean.beta.view().insert_axis(Axis(1));
+        let constant =
+            self.deviations.constant.select(Axis(0), &left) * root + self.mean.constant[0];
+        let mut prior = Self {
+            deviations: Weights { beta, constant },
+            ..self.clone()
+        };
+        prior.centre();
+        Ok(prior)
+    }
+
+    /// How many materials it has learnt from.
+    #[must_use]
+    pub fn materials(&self) -> usize {
+        self.deviations.beta.ncols()
+    }
+
+    /// What it has learnt from, in words.
+    #[must_use]
+    pub fn source(&self) -> &str {
+        &self.source
+    }
+
+    /// The same prior with another account of what it has learnt from.
+    #[must_use]
+    pub fn with_source(mut self, source: String) -> Self {
+        self.source = source;
+        self
+    }
+
+    /// Fits one network for all channels of `values` (BRDF in 1/sr, shape (pairs, channels)), each
+    /// channel with the strengths that leave-one-out in this metric chooses.
+    ///
+    /// # Errors
+    /// Where these measurements cannot be fitted.
+    pub fn fit_model(
+        &self,
+        pairs: &[Pair],
+        values: ArrayView2<'_, f64>,
+        metric: Metric,
+    ) -> Result<BrdfModel> {
+        check(pairs, values)?;
+        let x = self.features.compute(pairs);
+        let h = self.layer.hidden_matrix(&x)?;
+        let link = Link::default_log().fit(values)?;
+        let targets = link.to_targets(values)?;
+        let level = h.dot(&self.mean.beta) + self.mean.constant[0];
+        let rest = &targets - &level.insert_axis(Axis(1));
+        let taught = h.dot(&self.deviations.beta) + &self.deviations.constant;
+        let mean_square = |a: &Array2<f64>| {
+            let sum = a.iter().map(|v| v * v).sum::<f64>();
+            (sum / a.nrows() as f64).max(f64::MIN_POSITIVE)
+        };
+        let relative = mean_square(&taught) / mean_square(&h);
+
+        let channels = values.ncols();
+        let mut best: Vec<Option<(f64, Array1<f64>, f64)>> = vec![None; channels];
+        let mut held_out = targets.clone();
+        for general in GENERAL {
+            let rho = (general * relative).sqrt();
+            let design =
+                concatenate(Axis(1), &[taught.view(), (&h * rho).view()]).map_err(|_| {
+                    Error::Elm(elm::Error::Empty {
+                        what: "columns of the prior",
+                        rows: h.nrows(),
+                        columns: h.ncols(),
+                    })
+                })?;
+            let problem = LeastSquares::new(&design, &rest)?.intercept(true);
+            let validator = Validator::new(&problem)?;
+            let lambda = validator.strengths(Ridge::leave_one_out())?;
+            let left_out = match validator.leave_one_out(&lambda) {
+                Ok(left_out) => left_out.residuals().to_owned(),
+                // One measurement: nothing can be left out of it.
+                Err(elm::Error::Undetermined { .. }) => rest.clone(),
+                Err(error) => return Err(error.into()),
+            };
+            let predicted = link.to_values(&targets - &left_out)?;
+            let mut chosen = Vec::new();
+            for channel in 0..channels {
+                let predicted = predicted.select(Axis(1), &[channel]);
+                let truth = values.select(Axis(1), &[channel]);
+                let score = Metrics::of(pairs, predicted.view(), truth.view())?;
+                let score = metric.of(&score);
+                if best[channel].as_ref().is_none_or(|best| score < best.0) {
+                    chosen.push((channel, score));
+                }
+            }
+            if chosen.is_empty() {
+                continue;
+            }
+            let solution = Solver::from(Ridge::leave_one_out()).solve(&problem)?;
+            let split = taught.ncols();
+            for (channel, score) in chosen {
+                let z = solution.beta.column(channel);
+                let (z, w) = z.split_at(Axis(0), split);
+                let beta = &self.mean.beta + &self.deviations.beta.dot(&z) + &(&w * rho);
+                let constant = self.mean.constant[0]
+                    + self.deviations.constant.dot(&z)
+                    + solution.intercept[channel];
+                best[channel] = Some((score, beta, constant));
+                held_out
+                    .column_mut(channel)
+                    .assign(&left_out.column(channel));
+            }
+        }
+        let mut beta = Array2::zeros((h.ncols(), channels));
+        let mut intercept = Array1::zeros(channels);
+        for (channel, best) in best.into_iter().enumerate() {
+            if let Some((_, own, constant)) = best {
+                beta.column_mut(channel).assign(&own);
+                intercept[channel] = constant;
+            }
+        }
+        let hidden = self.layer.hidden().clone();
+        let network = Elm::from_parts(self.layer.scaler().cloned(), hidden, beta, intercept)?;
+        let predicted = link.to_values(&targets - &held_out)?;
+        let layer = Layer::Drawn(vec![Draw {
+            params: self.params.clone(),
+            kept: None,
+            scales: 0,
+        }]);
+        let mut model = BrdfModel::new(self.features, link, layer, network);
+        let mut about = model.provenance().clone();
+        about.rows = pairs.len();
+        about.metric = Some(metric);
+        about.held_out = Some(Metrics::of(pairs, predicted.view(), values)?);
+        about.prior = Some(self.source.clone());
+        model = model.with_provenance(about);
+        Ok(model)
+    }
+}
+
+impl Fit for Prior {
+    /// Every channel by itself, by RMSE.
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+        // Channels share all but the final choice, so one network serves them.
+        Ok(Box::new(SideBySide(vec![self.fit_model(
+            pairs,
+            values,
+            Metric::Rmse,
+        )?])))
+    }
+}
+
+impl From<Prior> for File {
+    fn from(prior: Prior) -> Self {
+        Self {
+            source: prior.source,
+            features: prior.features,
+            params: prior.params,
+            scaler: prior.layer.scaler().cloned(),
+            mean: prior.mean,
+            deviations: prior.deviations,
+        }
+    }
+}
+
+impl TryFrom<File> for Prior {
+    type Error = Error;
+
+    fn try_from(file: File) -> Result<Self> {
+        let inputs = file.features.inputs().len();
+        let neurons = file.mean.beta.len();
+        let (rows, materials) = file.deviations.beta.dim();
+        for (what, expected, found) in [
+            (
+                "neurons of the prior's layer",
+                neurons,
+                file.params.neurons(),
+            ),
+            ("neurons of the prior's deviations", neurons, rows),
+            ("constants of the prior's mean", 1, file.mean.constant.len()),
+            (
+                "constants of the prior's deviations",
+                materials,
+                file.deviations.constant.len(),
+            ),
+        ] {
+            if expected != found {
+                return Err(Error::Elm(elm::Error::Shape {
+                    what,
+                    expected,
+                    found,
+                }));
+            }
+        }
+        let numbers = file.mean.beta.iter().chain(&file.mean.constant);
+        let numbers = numbers
+            .chain(&file.deviations.beta)
+            .chain(&file.deviations.constant);
+        if numbers.into_iter().any(|number| !number.is_finite()) {
+            return Err(Error::Elm(elm::Error::NotFinite {
+                what: "weights of the prior",
+                row: 0,
+                column: 0,
+            }));
+        }
+        let hidden = file.params.clone().check()?.hidden_layer(inputs)?;
+        let beta = Array2::zeros((neurons, 1));
+        let layer = Elm::from_parts(file.scaler, hidden, beta, Array1::zeros(1))?;
+        Ok(Self {
+            features: file.features,
+            params: file.params,
+            layer,
+            mean: file.mean,
+            deviations: file.deviations,
+            source: file.source,
+        })
+    }
+}
+
+impl Persist for Prior {
+    const KIND: &'static str = "elm-brdf prior";
+    const SCALAR: &'static str = "f64";
+}
