@@ -230,6 +230,15 @@ impl FittedLink {
         Ok(())
     }
 
+    /// The offset of each channel's logarithm, 0 where there is none.
+    pub(crate) fn offsets(&self) -> Vec<f64> {
+        let offset = |channel: &Channel| match *channel {
+            Channel::Log { offset, .. } => offset,
+            Channel::Identity | Channel::CubeRoot { .. } => 0.0,
+        };
+        self.channels.iter().map(offset).collect()
+    }
+
     /// Numbers kept for each channel.
     pub(crate) fn floats_per_channel(&self) -> usize {
         match self.channels.first() {

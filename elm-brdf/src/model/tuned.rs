@@ -28,15 +28,17 @@ use crate::quality;
 /// | `max_floats` | none | most numbers that the model may store |
 /// | `seed` | 1 | random layers, and rows drawn for the search |
 ///
-/// **Few measurements** (up to [`Tuned::MANY`]): sine neurons with random frequencies. For each set
-/// of inputs the scales of the inputs are tried from a fixed low-discrepancy set, each with its
+/// **Few measurements** (up to [`Tuned::MANY`]): sine neurons with random frequencies. The scales of the inputs are tried from a fixed low-discrepancy set, each with its
 /// strength of regularisation by exact leave-one-out; the best [`MEMBERS`](Tuned::MEMBERS), judged by
-/// leave-one-out in the metric, are averaged into one network, 200 neurons each. With `neurons` or
-/// `max_floats` given, the best alone is taken.
+/// leave-one-out, are averaged into one network, 400 neurons each. With `neurons` or `max_floats`
+/// given, the best alone is taken. Inputs are [`Features::SumDifference`] unless said otherwise.
 ///
 /// **Many measurements**: inputs and scales by a search on part of the rows, judged on others; then
-/// twice the neurons wanted are drawn and the less useful half is [pruned](elm::prune). 213 neurons
-/// unless said otherwise, which for three channels is 675 stored numbers.
+/// more neurons than wanted are drawn and the less useful are [pruned](elm::prune); then one solve on
+/// all rows, weighted by what the metric makes of an error. 213 neurons unless said otherwise, which
+/// for three channels is 675 stored numbers. The errors in the model's
+/// [provenance](super::Provenance) are those of the search's small network on the rows that judged it:
+/// an upper bound more than an estimate.
 ///
 /// As [`Fit`] every channel is chosen for by itself; [`fit_model`](Self::fit_model) makes one network
 /// for all channels.
@@ -103,46 +105,36 @@ impl Tuned {
     }
 
     /// The sets of inputs to choose among.
-    fn sets(&self) -> Vec<Features> {
-        self.features.map_or_else(
-            || {
-                vec![
-                    Features::SumDifference,
-                    Features::ReciprocalCosines,
-                    Features::Highlight,
-                ]
-            },
-            |set| vec![set],
-        )
+    fn sets(&self, open: &[Features]) -> Vec<Features> {
+        self.features.map_or_else(|| open.to_vec(), |set| vec![set])
     }
 
-    /// The neurons that the limits allow, or `usual`; `bits` are those of neurons drawn per neuron
-    /// kept that the file must have.
+    /// The neurons that the limits allow, or `usual`. `drawn` says how many are drawn for so many
+    /// to be kept, which of them being a bit each; `per_link` numbers go with each channel's link.
     fn size(
         &self,
         usual: usize,
         inputs: usize,
         channels: usize,
         per_link: usize,
-        bits: f64,
+        drawn: impl Fn(usize) -> usize,
     ) -> Result<usize> {
         let wanted = self.neurons.unwrap_or(usual);
-        let Some(floats) = self.max_floats else {
+        let Some(most) = self.max_floats else {
             return Ok(wanted);
         };
-        // Mean, factor and scale of each input, constant and link of each channel, and one number
-        // begun by the bits.
-        let fixed = 3 * inputs + channels * (1 + per_link) + 1;
-        let per_neuron = channels as f64 + bits / 32.0;
-        let fitting = (floats.saturating_sub(fixed) as f64 / per_neuron).floor() as usize;
-        if fitting == 0 {
-            return Err(Error::Elm(elm::Error::Parameter {
+        // Mean, factor and scale of each input; constant and link of each channel.
+        let fixed = 3 * inputs + channels * (1 + per_link);
+        let floats = |neurons: usize| fixed + channels * neurons + drawn(neurons).div_ceil(32);
+        let largest = self.neurons.unwrap_or(most / channels);
+        (1..=largest)
+            .rev()
+            .find(|&neurons| floats(neurons) <= most)
+            .ok_or(Error::Elm(elm::Error::Parameter {
                 name: "max_floats",
-                value: floats as f64,
-                expected: "enough for a neuron: some 30 and more",
-            }));
-        }
-        Ok(self.neurons.map_or(fitting, |neurons| neurons.min(fitting)))
+                value: most as f64,
+                expected: "enough for the scales, the links and one neuron: some 20 and more",
+            }))
     }
 
     /// Sine neurons of normal frequencies at three scales: heavier tails than one scale has.
@@ -250,8 +242,16 @@ pub(crate) fn without_weights(scaler: &Scaler<f64>, hidden: HiddenLayer<f64>) ->
 }
 
 /// Output weights and constants by this ridge.
-fn solve(h: &Array2<f64>, t: &Array2<f64>, ridge: Ridge) -> Result<(Array2<f64>, Array1<f64>)> {
-    let problem = LeastSquares::new(h, t)?.intercept(true);
+fn solve(
+    h: &Array2<f64>,
+    t: &Array2<f64>,
+    weights: Option<&Array1<f64>>,
+    ridge: Ridge,
+) -> Result<(Array2<f64>, Array1<f64>)> {
+    let mut problem = LeastSquares::new(h, t)?.intercept(true);
+    if let Some(weights) = weights {
+        problem = problem.weights(weights)?;
+    }
     let solution = Solver::from(ridge).solve(&problem)?;
     Ok((solution.beta, solution.intercept))
 }
