@@ -6,10 +6,12 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use crate::brdf::Fit;
+use crate::brdf::{Brdf, Fit};
 use crate::error::{Error, Result};
 use crate::geometry::{self, Pair};
-use crate::metrics::Metrics;
+use crate::metrics::{Metric, Metrics};
+use crate::model::SideBySide;
+use crate::prior::{Prior, PriorParams};
 use crate::quality::{self, NoiseFloor};
 
 /// Which fold each measurement is held out in: a seeded shuffle, dealt into folds whose sizes
@@ -166,6 +168,68 @@ pub fn cross_validate_samples(
         channels,
         predicted,
     })
+}
+
+/// Cross-validates each material of `data` with a [prior](crate::prior) from the materials of
+/// `pool` but itself and other measurements of the same specimen, all measured at the same
+/// directions; calls `done` with the number of materials so far and in all.
+///
+/// No value of the material has entered its prior; the values of the others at the directions held
+/// out have. Materials of the pool that lack a direction teach nothing.
+///
+/// # Errors
+/// As for [`cross_validate`], and those of [`PriorParams::build`] and [`Prior::without`].
+pub fn cross_validate_pooled(
+    params: &PriorParams,
+    pool: &Measurements,
+    data: &Measurements,
+    folds: &Folds,
+    mut done: impl FnMut(usize, usize),
+) -> Result<Vec<MaterialScores>> {
+    let whole: Vec<&Material> = pool
+        .materials
+        .iter()
+        .filter(|material| material.rows.len() == pool.directions.len())
+        .collect();
+    let pairs = geometry::pairs(&pool.directions);
+    let priors = (0..data.channels.len())
+        .map(|channel| {
+            let mut values = Array2::zeros((pairs.len(), whole.len()));
+            for (mut column, material) in values.columns_mut().into_iter().zip(&whole) {
+                column.assign(&material.values.column(channel));
+            }
+            params.build(&pairs, values.view())
+        })
+        .collect::<Result<Vec<Prior>>>()?;
+    let mut all = Vec::new();
+    for material in &data.materials {
+        let same = |place: &usize| whole[*place].id.specimen() == material.id.specimen();
+        let same: Vec<usize> = (0..whole.len()).filter(same).collect();
+        let own = priors.iter().map(|prior| prior.without(&same));
+        let method = ByChannel(own.collect::<Result<_>>()?);
+        let alone = Measurements {
+            materials: vec![material.clone()],
+            ..data.clone()
+        };
+        all.extend(cross_validate(&method, &alone, folds, |_, _| {})?);
+        done(all.len(), data.materials.len());
+    }
+    Ok(all)
+}
+
+/// A prior for each channel.
+struct ByChannel(Vec<Prior>);
+
+impl Fit for ByChannel {
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+        let columns = values.axis_chunks_iter(Axis(1), 1);
+        let models = self
+            .0
+            .iter()
+            .zip(columns)
+            .map(|(prior, column)| prior.fit_model(pairs, column, Metric::Rmse));
+        Ok(Box::new(SideBySide(models.collect::<Result<_>>()?)))
+    }
 }
 
 /// Indices of the materials that were measured at the same directions, in order of appearance.

@@ -20,7 +20,9 @@ use crate::geometry::{Pair, pairs};
 use crate::link::Link;
 use crate::model::{BrdfParams, Tuned};
 use crate::prior::PriorParams;
-use crate::protocol::{Folds, MaterialScores, cross_validate, cross_validate_pooled, cross_validate_samples};
+use crate::protocol::{
+    Folds, MaterialScores, cross_validate, cross_validate_pooled, cross_validate_samples,
+};
 use crate::reference::{self, Growth, Reference};
 use crate::report::plot::{self, Shown};
 use crate::report::{Comparison, Data, Entry, Format, Words};
@@ -178,7 +180,13 @@ impl Subject {
             seed,
             ..PriorParams::default()
         };
-        Ok(cross_validate_pooled(&params, &pool, data, folds, |_, _| {})?)
+        Ok(cross_validate_pooled(
+            &params,
+            &pool,
+            data,
+            folds,
+            |_, _| {},
+        )?)
     }
 
     fn data(&self, scores: &[MaterialScores]) -> Data {

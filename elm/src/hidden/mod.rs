@@ -138,7 +138,7 @@ impl<A: Scalar> HiddenLayer<A> {
     }
 
     /// The neurons of several layers as one layer, those of one function side by side, in their
-    /// order otherwise.
+    /// order otherwise; of one layer that layer itself.
     ///
     /// # Errors
     /// [`Error::Empty`] of none, [`Error::Shape`] for layers of different inputs.
@@ -150,6 +150,9 @@ impl<A: Scalar> HiddenLayer<A> {
                 columns: 0,
             });
         };
+        if layers.len() == 1 {
+            return Ok(first.clone());
+        }
         for layer in layers {
             check_length("inputs of a layer", layer.inputs(), first.inputs())?;
         }

@@ -16,14 +16,14 @@ use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
 use crate::model::{BrdfModel, Layer};
 
-/// Neurons unless said otherwise: 675 numbers for three channels.
+/// Neurons unless said otherwise: some 675 numbers for three channels.
 pub(super) const NEURONS: usize = 213;
 /// Rows that the search fits to, and as many others that judge.
-const SEARCH_ROWS: usize = 1000;
+const SEARCH_ROWS: usize = 1500;
 /// Rows that decide which neurons are kept.
 const PRUNE_ROWS: usize = 1500;
 /// Neurons of the search.
-const SEARCH_NEURONS: usize = 80;
+const SEARCH_NEURONS: usize = 96;
 /// Weak, but strong enough for the normal equations.
 const RIDGE: f64 = 3e-8;
 /// A scale is moved by this factor, then by its root.
