@@ -59,12 +59,6 @@ pub enum Error {
     /// A material of a scene that names no source, or several.
     #[error("expected exactly one of curet, csv, model and analytic")]
     MaterialSource,
-    /// A saved model that cannot be loaded.
-    #[error("{}: saved models cannot be loaded yet", path.display())]
-    NoModelFiles {
-        /// The file.
-        path: PathBuf,
-    },
     /// A table of samples without a column that it needs.
     #[error("{}: there is no column '{column}'", path.display())]
     MissingColumn {

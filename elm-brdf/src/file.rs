@@ -3,6 +3,8 @@
 use std::io::{self, Write};
 use std::path::Path;
 
+use elm::persist;
+
 use crate::error::{Error, Result};
 
 /// Writes beside the file and renames, so that an interruption leaves the old one.
@@ -13,6 +15,21 @@ pub(crate) fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
     put(path, bytes).map_err(|reason| Error::Write {
         path: path.to_owned(),
         reason,
+    })
+}
+
+/// Reads a model, or what else was saved, and names the file where it cannot.
+///
+/// # Errors
+/// [`Error::File`] or [`Error::Contents`].
+pub(crate) fn load<T: persist::Persist>(path: &Path) -> Result<T> {
+    persist::load(path).map_err(|error| match error {
+        // It names the file itself.
+        persist::Error::Io { .. } => error.into(),
+        reason => Error::Contents {
+            path: path.to_owned(),
+            reason,
+        },
     })
 }
 

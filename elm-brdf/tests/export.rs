@@ -118,7 +118,7 @@ fn directions() -> Vec<Pair> {
             }
         })
         .collect();
-    for theta in [0.0, 1e-4, 0.3, 0.785, 1.2, 1.55, 1.5707] {
+    for theta in [0.0, 1e-4, 0.3, 0.785, 1.2, 1.55, 1.57] {
         let at = |phi| cartesian(theta, phi);
         for (incident, outgoing) in [
             (at(0.4), at(0.4)),

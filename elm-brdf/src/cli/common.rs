@@ -6,7 +6,6 @@ use std::path::Path;
 use std::str::FromStr;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use elm::persist;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::data::{self, Source};
@@ -67,20 +66,6 @@ pub(super) fn progress(what: &str) -> ProgressBar {
     let style =
         ProgressStyle::with_template(&format!("{{bar:40}} {what} {{pos}}/{{len}}, {{eta}} left"));
     bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-}
-
-/// Reads a model or what else was saved, and names the file where it cannot.
-pub(super) fn load<T: persist::Persist>(path: &Path) -> Result<T, Failure> {
-    persist::load(path).map_err(|error| {
-        Failure::Failed(match error {
-            // It names the file itself.
-            persist::Error::Io { .. } => error.into(),
-            reason => Error::Contents {
-                path: path.to_owned(),
-                reason,
-            },
-        })
-    })
 }
 
 impl From<elm::Error> for Failure {

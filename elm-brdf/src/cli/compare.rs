@@ -95,8 +95,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     // By model, then by seed; the best so far is kept for its pictures.
     let mut entries = Vec::new();
     let mut best: Option<(f64, String, Vec<MaterialScores>)> = None;
-    for index in 0..names.len() {
-        if names[index].name == POOLED && matches!(subject, Subject::Samples(_)) {
+    for (index, named) in names.iter().enumerate() {
+        if named.name == POOLED && matches!(subject, Subject::Samples(_)) {
             // One material has no others.
             progress.inc(seeds.len() as u64);
             continue;
@@ -115,7 +115,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
             });
             progress.inc(1);
         }
-        let entry = subject.entry(&names[index], fitting, arguments.folds, &runs)?;
+        let entry = subject.entry(named, fitting, arguments.folds, &runs)?;
         let error = entry.held_out.rmse;
         if best.as_ref().is_none_or(|best| error < best.0) {
             best = Some((error, entry.model.clone(), runs.swap_remove(0)));

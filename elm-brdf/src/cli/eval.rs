@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::common::{load, one_of};
+use super::common::one_of;
 use super::samples::{Material, Reading};
 use super::{Failure, print};
 use crate::brdf::Brdf;
 use crate::error::Error;
+use crate::file;
 use crate::geometry::pairs;
 use crate::metrics::Metrics;
 use crate::model::BrdfModel;
@@ -74,7 +75,7 @@ struct Evaluation {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let model: BrdfModel = load(&arguments.model)?;
+    let model: BrdfModel = file::load(&arguments.model)?;
     let Material {
         samples, source, ..
     } = arguments.reading.read(&arguments.samples)?;

@@ -5,11 +5,12 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::common::{load, one_of, usage};
+use super::common::{one_of, usage};
 use super::samples::{Material, Reading};
 use super::{Failure, print};
 use crate::error::Error;
 use crate::features::Features;
+use crate::file;
 use crate::geometry::pairs;
 use crate::metrics::Metric;
 use crate::model::{BrdfModel, Tuned};
@@ -58,7 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         samples, source, ..
     } = arguments.reading.read(&arguments.samples)?;
     let prior: Option<Prior> = match &arguments.prior {
-        Some(path) => Some(load(path)?),
+        Some(path) => Some(file::load(path)?),
         None => None,
     };
     let start = Instant::now();

@@ -142,7 +142,7 @@ fn token_length(text: &str) -> usize {
         [b'0'..=b'9', ..] => {
             let digits = of(&|c| c.is_ascii_digit() || c == '.');
             // An exponent, with or without a sign.
-            let sign = match text[digits..].as_bytes() {
+            let sign = match &text.as_bytes()[digits..] {
                 [b'e', b'-', ..] => 2,
                 [b'e', ..] => 1,
                 _ => return digits,

@@ -32,6 +32,7 @@ const INPUTS: &[(&str, &str)] = &[
         "sum / sqrt(sum * sum + difference * difference)",
     ),
     ("cos theta_i + cos theta_o", "sz"),
+    ("cos theta_o - cos theta_i", "oz - iz"),
     ("cos theta_i cos theta_o", "iz * oz"),
     ("sin theta_i sin theta_o cos dphi", "ix * ox + iy * oy"),
 ];

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::geometry::{Pair, pairs};
 use crate::link::Link;
-use crate::model::BrdfParams;
+use crate::model::{BrdfModel, BrdfParams};
 use crate::reference;
 
 /// A model and where it comes from, in a word: "CUReT", "stand-in", a file's name, "analytic".
@@ -226,7 +226,15 @@ impl Supply for Library {
                 let method = self.method(material)?;
                 method.fit(&read_csv(&dir.join(file))?, &file.display().to_string())
             }
-            (None, None, Some(path), None) => Err(Error::NoModelFiles { path: path.clone() }),
+            (None, None, Some(file), None) => {
+                let path = dir.join(file);
+                let model: BrdfModel = crate::file::load(&path)?;
+                Ok(Supplied {
+                    origin: format!("{} ({})", file.display(), model.provenance().data),
+                    name: None,
+                    brdf: Box::new(model),
+                })
+            }
             (None, None, None, Some(name)) => Ok(Supplied {
                 brdf: Box::new(Analytic::from_scene(name, material)?),
                 origin: "a formula".to_owned(),

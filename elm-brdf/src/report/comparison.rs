@@ -109,7 +109,7 @@ impl Entry {
             let material = first.get(m)?;
             let of_seeds = runs.iter().filter_map(|run| run.get(m)?.channels.get(c));
             Some(OfMaterial {
-                id: material.id.map(|id| id.number()),
+                id: material.id.map(elm_datasets::MaterialId::number),
                 name: material.name.clone(),
                 channel: channel.clone(),
                 rmse: mean(of_seeds.map(|scores| scores.held_out.rmse))?,
