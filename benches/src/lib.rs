@@ -3,5 +3,6 @@
 
 pub mod networks;
 pub mod peaks;
+pub mod peers;
 pub mod stress;
 pub mod timing;

@@ -5,6 +5,7 @@ use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip};
 use serde::{Deserialize, Serialize};
 
 use super::frame::Prepared;
+use super::moments::{HiddenRows, RowSource};
 use super::spectrum::{RowSpectrum, Spectrum};
 use super::{LeastSquares, Reason, Solution, gram};
 use crate::error::{Error, Result};
@@ -116,6 +117,15 @@ impl Ridge {
     pub(super) fn solve<A: Scalar>(self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
         match self.lambda {
             Lambda::Relative(lambda) => {
+                let mut source = RowSource {
+                    hidden: HiddenRows::Matrix(problem.hidden),
+                    targets: problem.targets,
+                    weights: problem.weights,
+                    intercept: problem.intercept,
+                };
+                if let Some(solution) = self.solve_rows(&mut source)? {
+                    return Ok(solution);
+                }
                 let prepared = Prepared::new(problem);
                 if gram::allowed::<A>(lambda)
                     && let Some(solution) = gram::solve(&prepared, lambda)
@@ -136,6 +146,20 @@ impl Ridge {
                 };
                 Ok(self.search(&wide, unit_roundoff::<A>())?.narrow())
             }
+        }
+    }
+
+    /// The answer where a given strength allows the normal equations and there are at least as
+    /// many rows as neurons.
+    pub(super) fn solve_rows<A: Scalar>(
+        self,
+        source: &mut RowSource<'_, A>,
+    ) -> Result<Option<Solution<A>>> {
+        match self.lambda {
+            Lambda::Relative(lambda) if gram::allowed::<A>(lambda) => {
+                gram::solve_rows(source, lambda)
+            }
+            _ => Ok(None),
         }
     }
 
