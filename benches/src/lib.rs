@@ -6,3 +6,4 @@ pub mod peaks;
 pub mod peers;
 pub mod stress;
 pub mod timing;
+pub mod topics;

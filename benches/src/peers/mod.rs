@@ -13,3 +13,4 @@ pub use data::{SIZES, Size};
 pub use environment::{Environment, Trouble};
 pub use report::{Format, Record, print};
 pub use rivals::{Rival, fit_once};
+pub use worker::Worker;

@@ -167,7 +167,7 @@ impl CrateElm {
 
     pub(super) fn fit(&self, neurons: usize) -> ELM {
         let (inputs, outputs) = (self.x[0].len(), self.t[0].len());
-        let tanh = ActivationFunction::Tanh;
+        let tanh = ActivationFunction::TanH;
         let mut model = ELM::new(inputs, neurons, outputs, tanh, Epsilon::Default);
         model.train(&self.x, &self.t);
         model

@@ -12,8 +12,8 @@ use super::rivals::Setting;
 
 const SCRIPT: &str = include_str!("../../peers/worker.py");
 
-/// A running worker; it ends when this is dropped.
-pub(super) struct Worker {
+/// A running Python script that answers requests; it ends when this is dropped.
+pub struct Worker {
     child: Child,
     requests: Option<ChildStdin>,
     answers: BufReader<ChildStdout>,
@@ -21,8 +21,16 @@ pub(super) struct Worker {
 
 impl Worker {
     pub(super) fn start(python: &Path) -> Result<Self, String> {
+        Self::of_script(python, SCRIPT)
+    }
+
+    /// Starts a script, on one thread.
+    ///
+    /// # Errors
+    /// Where the interpreter does not start.
+    pub fn of_script(python: &Path, script: &str) -> Result<Self, String> {
         let mut command = Command::new(python);
-        command.args(["-c", SCRIPT]);
+        command.args(["-c", script]);
         for variable in [
             "OMP_NUM_THREADS",
             "OPENBLAS_NUM_THREADS",
@@ -88,7 +96,11 @@ impl Worker {
         Ok(answer["text"].as_str().unwrap_or_default().to_owned())
     }
 
-    fn ask(&mut self, request: Value) -> Result<Value, String> {
+    /// One request and its answer.
+    ///
+    /// # Errors
+    /// What the script says went wrong, or that it has ended.
+    pub fn ask(&mut self, request: Value) -> Result<Value, String> {
         let gone = |error: std::io::Error| format!("the Python worker is gone: {error}");
         if let Some(requests) = &mut self.requests {
             writeln!(requests, "{request}").map_err(gone)?;

@@ -37,9 +37,23 @@ impl<A: Scalar> HiddenRows<'_, A> {
         }
     }
 
+    /// A power of two that brings the matrix into the middle of the range. The values of a layer
+    /// are there already, or its sums are found to be out of range.
+    fn scale(&self, root_weights: &Array1<A>) -> A {
+        match self {
+            Self::Layer(_) => A::one(),
+            Self::Matrix(matrix) => {
+                let largest = weighted_magnitudes(*matrix, root_weights);
+                power_of_two(largest.iter().fold(A::zero(), |m, x| m.max(*x)))
+            }
+        }
+    }
+
+    /// Writes rows divided by `scale`, less `shift`.
     fn write(
         &mut self,
         rows: Range<usize>,
+        scale: A,
         shift: &[A],
         to: &mut [A],
         stride: usize,
@@ -50,7 +64,7 @@ impl<A: Scalar> HiddenRows<'_, A> {
                 let rows = matrix.slice(s![rows, ..]);
                 for (row, to) in rows.rows().into_iter().zip(to.chunks_mut(stride)) {
                     for ((to, &value), &shift) in to.iter_mut().zip(row).zip(shift) {
-                        *to = value - shift;
+                        *to = value / scale - shift;
                     }
                 }
             }
@@ -94,7 +108,7 @@ impl<A: Scalar> RowSource<'_, A> {
         rows.clamp(64, 1024).min(self.rows())
     }
 
-    /// Writes a tile: rows less `shift`, targets divided by their scale, all times the root of the
+    /// Writes a tile: rows divided by their scales and less `shift`, all times the root of the
     /// row's weight. A row of weight 0 may hold anything, even what overflows; it becomes 0.
     fn write(
         &mut self,
@@ -105,7 +119,9 @@ impl<A: Scalar> RowSource<'_, A> {
     ) -> Result<()> {
         let (neurons, width) = (self.neurons(), self.width());
         let (hidden_shift, target_shift) = shift.split_at(neurons);
-        self.hidden.write(rows.clone(), hidden_shift, to, width)?;
+        let scale = frame.hidden_scale;
+        self.hidden
+            .write(rows.clone(), scale, hidden_shift, to, width)?;
         let targets = self.targets.slice(s![rows.clone(), ..]);
         let roots = frame.root_weights.slice(s![rows]);
         for ((to, targets), &root) in to.chunks_exact_mut(width).zip(targets.rows()).zip(roots) {
@@ -160,6 +176,7 @@ impl<A: Scalar> Moments<A> {
         let mut frame = Frame::of_weights(rows, source.weights.as_ref(), source.intercept);
         frame.target_scale =
             weighted_magnitudes(source.targets, &frame.root_weights).mapv_into(power_of_two);
+        frame.hidden_scale = source.hidden.scale(&frame.root_weights);
         frame.hidden_mean = Array1::zeros(neurons);
         frame.target_mean = Array1::zeros(outputs);
 
@@ -207,7 +224,7 @@ impl<A: Scalar> Moments<A> {
             correction = hidden.dot(&hidden) * frame.total_weight;
             let mean = &ArrayView1::from(&shift) + &distance;
             let (hidden, target) = mean.view().split_at(Axis(0), neurons);
-            frame.hidden_mean.assign(&hidden);
+            frame.hidden_mean = &hidden * frame.hidden_scale;
             frame.target_mean = &target * &frame.target_scale;
         }
         Self {
@@ -252,7 +269,8 @@ impl<A: Scalar> Moments<A> {
         // What the shifted rows are still short of being centred.
         let scaled = &self.frame.target_mean / &self.frame.target_scale;
         let constant = if self.frame.intercept {
-            let hidden = &self.frame.hidden_mean - &ArrayView1::from(&self.shift[..neurons]);
+            let hidden = &self.frame.hidden_mean / self.frame.hidden_scale
+                - ArrayView1::from(&self.shift[..neurons]);
             scaled - &ArrayView1::from(&self.shift[neurons..]) - hidden.dot(beta)
         } else {
             Array1::zeros(outputs)
