@@ -29,21 +29,19 @@ class Standardised:
 
 
 class RandomFeatures(Standardised):
-    """tanh features; weights standard normal, or uniform of a given scale as ours."""
+    """tanh features; the layer is standard normal, or given: that of our network."""
 
-    def __init__(self, neurons, scale, alpha, seed):
-        self.neurons, self.scale, self.alpha, self.seed = neurons, scale, alpha, seed
+    def __init__(self, neurons, layer, alpha, seed):
+        self.neurons, self.layer, self.alpha, self.seed = neurons, layer, alpha, seed
 
     def hidden(self, x):
         x = self.prepare(x)
-        random = np.random.default_rng(self.seed)
-        shape = (x.shape[1], self.neurons)
-        if self.scale is None:
-            self.weights = random.standard_normal(shape)
+        if self.layer is None:
+            random = np.random.default_rng(self.seed)
+            self.weights = random.standard_normal((x.shape[1], self.neurons))
             self.biases = random.standard_normal(self.neurons)
         else:
-            self.weights = self.scale * random.uniform(-1, 1, shape)
-            self.biases = self.scale * random.uniform(-1, 1, self.neurons)
+            self.weights, self.biases = self.layer
         return np.tanh(x @ self.weights + self.biases)
 
     def pack(self):
@@ -86,8 +84,8 @@ class SklearnRidge(RandomFeatures):
 
 
 class Hpelm(Standardised):
-    def __init__(self, neurons, scale, alpha, seed):
-        self.neurons, self.scale, self.alpha, self.seed = neurons, scale, alpha, seed
+    def __init__(self, neurons, layer, alpha, seed):
+        self.neurons, self.layer, self.alpha, self.seed = neurons, layer, alpha, seed
 
     def fit(self, x, t):
         import hpelm
@@ -95,12 +93,10 @@ class Hpelm(Standardised):
         x = self.prepare(x)
         np.random.seed(self.seed)
         self.model = hpelm.ELM(x.shape[1], t.shape[1], norm=self.alpha)
-        if self.scale is None:
+        if self.layer is None:
             self.model.add_neurons(self.neurons, "tanh")
         else:
-            weights = self.scale * np.random.uniform(-1, 1, (x.shape[1], self.neurons))
-            biases = self.scale * np.random.uniform(-1, 1, self.neurons)
-            self.model.add_neurons(self.neurons, "tanh", weights, biases)
+            self.model.add_neurons(self.neurons, "tanh", *self.layer)
         self.model.train(x, t, "r")
 
     def predict(self, x):
@@ -110,7 +106,7 @@ class Hpelm(Standardised):
 class Sklearn(Standardised):
     """A regressor of scikit-learn with its default settings, but for those named."""
 
-    def __init__(self, neurons, scale, alpha, seed):
+    def __init__(self, neurons, layer, alpha, seed):
         self.seed = seed
 
     def fit(self, x, t):
@@ -202,10 +198,15 @@ class Worker:
         self.t = matrix(f"{folder}/t", rows, outputs)
         self.test_x = matrix(f"{folder}/test_x", tests, inputs)
         self.test_t = matrix(f"{folder}/test_t", tests, outputs)
+        neurons = request["neurons"]
+        self.layer = (
+            matrix(f"{folder}/weights", inputs, neurons), matrix(f"{folder}/biases", 1, neurons)[0]
+        )
 
-    def make(self, request):
+    def make(self, request, neurons=None):
+        layer = self.layer if request["our_layer"] and neurons is None else None
         return PEERS[request["peer"]](
-            request["neurons"], request["scale"], request["alpha"], request["seed"]
+            neurons or request["neurons"], layer, request["alpha"], request["seed"]
         )
 
     def fit(self, request):
@@ -227,7 +228,7 @@ class Worker:
 
     def memory(self, request):
         # A small fit first: what an import needs is not what a fit needs.
-        warm = self.make({**request, "neurons": 4})
+        warm = self.make(request, neurons=4)
         warm.fit(self.x[:50], self.t[:50])
         before = high_water(reset=True)
         self.make(request).fit(self.x, self.t)

@@ -28,8 +28,9 @@ pub struct Plan {
 const PAIRS: usize = 31;
 /// Processor time of a single timing: many calls of what is shorter.
 const LEAST: f64 = 0.02;
-/// Of the networks of one size: weights of this scale, and this regularisation.
-const SCALE: f64 = 0.2;
+/// Of the networks of one size: weights of this scale, and this regularisation. The peers are given
+/// the same random layer and the same absolute regularisation where they take one.
+const SCALE: f64 = 0.4;
 const LAMBDA: f64 = 1e-6;
 
 /// Runs the plan. `progress` is told what comes next.
@@ -60,10 +61,11 @@ pub fn compare(
     for &size in &plan.sizes {
         let problem = Problem::new(size);
         let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
-        let written = problem.write(folder.path());
+        let layer = of_size(size).fit(&problem.x, &problem.t)?;
+        let written = problem.write(folder.path(), layer.hidden());
         written.map_err(|error| error.to_string())?;
         worker.load(folder.path(), size, &problem)?;
-        let mut of_size = OfSize {
+        let mut comparison = OfSize {
             size,
             lists: CrateElm::new(&problem),
             problem,
@@ -74,20 +76,30 @@ pub fn compare(
         };
         for &rival in rivals.iter().filter(|rival| rival.can_fit(size)) {
             progress(&format!("{}: {}", size.name, rival.name()));
-            of_size.same_size(rival, &mut records)?;
+            comparison.same_size(rival, &mut records)?;
         }
         progress(&format!("{}: f32", size.name));
-        records.push(of_size.single_precision()?);
+        records.push(comparison.single_precision()?);
         for &rival in rivals.iter().filter(|rival| rival.is_elm()) {
             progress(&format!(
                 "{}: time to the error of {}",
                 size.name,
                 rival.name()
             ));
-            records.extend(of_size.time_to_error(rival)?);
+            records.extend(comparison.time_to_error(rival)?);
         }
     }
     Ok((records, about))
+}
+
+/// Our network of this size.
+fn of_size(size: Size) -> Ours {
+    Ours {
+        neurons: size.neurons,
+        scale: SCALE,
+        lambda: LAMBDA,
+        seed: 1,
+    }
 }
 
 struct OfSize<'a> {
@@ -141,18 +153,13 @@ impl OfSize<'_> {
 
     /// The same network size, the same weight distribution, the same regularisation.
     fn same_size(&mut self, rival: Rival, records: &mut Vec<Record>) -> Result<(), String> {
-        let ours = Ours {
-            neurons: self.size.neurons,
-            scale: SCALE,
-            lambda: LAMBDA,
-            seed: 1,
-        };
+        let ours = of_size(self.size);
         let (model, our_error) = ours.score(&self.problem)?;
         let alpha = LAMBDA * model.diagnosis().largest_singular_value.powi(2);
         let setting = Setting {
             rival,
             neurons: self.size.neurons,
-            scale: Some(SCALE),
+            our_layer: true,
             alpha,
             seed: 1,
         };
@@ -207,12 +214,7 @@ impl OfSize<'_> {
 
     /// Prediction in f64 over the same in f32: how many times faster that is.
     fn single_precision(&mut self) -> Result<Record, String> {
-        let ours = Ours {
-            neurons: self.size.neurons,
-            scale: SCALE,
-            lambda: LAMBDA,
-            seed: 1,
-        };
+        let ours = of_size(self.size);
         let single = Ours {
             // The weakest that f32 solves fast.
             lambda: 2e-4,

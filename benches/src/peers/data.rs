@@ -6,7 +6,8 @@ use std::io;
 use std::path::Path;
 use std::str::FromStr;
 
-use ndarray::{Array2, ArrayView1};
+use elm::HiddenLayer;
+use ndarray::{Array2, ArrayView1, Axis};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
@@ -111,22 +112,20 @@ impl Problem {
         }
     }
 
-    /// Writes the four matrices as little-endian `f64` by rows.
-    pub(super) fn write(&self, folder: &Path) -> io::Result<()> {
-        for (name, matrix) in self.parts() {
-            let bytes: Vec<u8> = matrix.iter().flat_map(|v| v.to_le_bytes()).collect();
+    /// Writes the four matrices and our network's layer as little-endian `f64` by rows.
+    pub(super) fn write(&self, folder: &Path, layer: &HiddenLayer<f64>) -> io::Result<()> {
+        for (name, values) in [
+            ("x", self.x.view()),
+            ("t", self.t.view()),
+            ("test_x", self.test_x.view()),
+            ("test_t", self.test_t.view()),
+            ("weights", layer.weights()),
+            ("biases", layer.biases().insert_axis(Axis(0))),
+        ] {
+            let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
             fs::write(folder.join(name), bytes)?;
         }
         Ok(())
-    }
-
-    fn parts(&self) -> [(&'static str, &Array2<f64>); 4] {
-        [
-            ("x", &self.x),
-            ("t", &self.t),
-            ("test_x", &self.test_x),
-            ("test_t", &self.test_t),
-        ]
     }
 }
 

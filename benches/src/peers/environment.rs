@@ -81,12 +81,13 @@ impl Environment {
             output(&mut command)
         };
         pip(&["--version"]).map_err(Trouble::NoPip)?;
-        let install = |package: &str| pip(&["install", "--quiet", "--prefer-binary", package]);
-        for package in packages(REQUIREMENTS) {
-            install(package).map_err(|why| Trouble::Install(format!("{package}: {why}")))?;
-        }
+        let install = |packages: &[&str]| {
+            pip(&[&["install", "--quiet", "--prefer-binary"], packages].concat())
+        };
+        let needed: Vec<&str> = packages(REQUIREMENTS).collect();
+        install(&needed).map_err(Trouble::Install)?;
         let left_out: Vec<String> = packages(OPTIONAL)
-            .filter(|package| install(package).is_err())
+            .filter(|package| install(&[package]).is_err())
             .map(str::to_owned)
             .collect();
         fs::write(&stamp, format!("{wanted}{}", left_out.join("\n")))

@@ -101,8 +101,9 @@ impl FromStr for Rival {
 pub(super) struct Setting {
     pub(super) rival: Rival,
     pub(super) neurons: usize,
-    /// Of uniform weights; without one, the rival's own distribution.
-    pub(super) scale: Option<f64>,
+    /// Whether the random layer is that of our network, where the rival can be given one; or the
+    /// rival draws it.
+    pub(super) our_layer: bool,
     /// The regularisation, absolute.
     pub(super) alpha: f64,
     pub(super) seed: u64,

@@ -41,7 +41,7 @@ pub(super) fn best_of(
             let mut setting = Setting {
                 rival,
                 neurons: (size.neurons / share).max(2),
-                scale: None,
+                our_layer: false,
                 alpha: alpha * size.rows as f64,
                 seed: 0,
             };

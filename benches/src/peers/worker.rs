@@ -68,6 +68,7 @@ impl Worker {
             "test_rows": problem.test_x.nrows(),
             "inputs": size.inputs,
             "outputs": size.outputs,
+            "neurons": size.neurons,
         }))?;
         Ok(())
     }
@@ -130,7 +131,7 @@ fn request(what: &str, setting: &Setting, least: f64) -> Value {
         "do": what,
         "peer": setting.rival.name(),
         "neurons": setting.neurons,
-        "scale": setting.scale,
+        "our_layer": setting.our_layer,
         "alpha": setting.alpha,
         "seed": setting.seed,
         "least_seconds": least,
