@@ -4,5 +4,7 @@
 pub mod auto;
 pub mod networks;
 pub mod peaks;
+pub mod peers;
 pub mod stress;
 pub mod timing;
+pub mod topics;

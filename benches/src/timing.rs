@@ -23,3 +23,49 @@ pub fn fastest_seconds(repetitions: usize, mut work: impl FnMut()) -> f64 {
         .map(|_| once(calls, &mut work) / f64::from(calls))
         .fold(f64::INFINITY, f64::min)
 }
+
+/// Processor time that this process has used, in seconds; where the system does not say, the time
+/// on the clock.
+#[must_use]
+pub fn processor_seconds() -> f64 {
+    #[cfg(unix)]
+    {
+        let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+        time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+    }
+    #[cfg(not(unix))]
+    {
+        use std::sync::LazyLock;
+        static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+        START.elapsed().as_secs_f64()
+    }
+}
+
+/// Processor time of a call, of as many as take `least_seconds` together.
+pub fn processor_seconds_per_call(least_seconds: f64, mut work: impl FnMut()) -> f64 {
+    let mut calls = 1_u32;
+    loop {
+        let start = processor_seconds();
+        for _ in 0..calls {
+            work();
+        }
+        let seconds = processor_seconds() - start;
+        if seconds >= least_seconds || calls >= 1 << 20 {
+            return seconds / f64::from(calls);
+        }
+        let enough = f64::from(calls) * 1.2 * least_seconds / seconds.max(1e-9);
+        calls = (enough as u32).max(2 * calls).min(1 << 20);
+    }
+}
+
+/// The median; 0 of nothing.
+#[must_use]
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let half = values.len() / 2;
+    match (values.len() % 2, values.get(half)) {
+        (_, None) => 0.0,
+        (1, Some(&middle)) => middle,
+        (_, Some(&upper)) => f64::midpoint(values[half - 1], upper),
+    }
+}

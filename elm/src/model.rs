@@ -7,9 +7,13 @@ use crate::activation::Activation;
 use crate::error::{Error, Result};
 use crate::hidden::{Biases, Distribution, HiddenLayer, Kind, Neurons, Plan};
 use crate::network::{Elm, design};
+use crate::predictor::LayerRows;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
-use crate::solve::{LeastSquares, Solver, check_length, check_matrix, check_room};
+use crate::solve::moments::{HiddenRows, RowSource};
+use crate::solve::{
+    LeastSquares, Solver, check_length, check_matrix, check_room, check_some_weight,
+};
 use crate::validate::{HeldOut, Validator};
 
 /// Settings of an extreme learning machine. Setters never fail; [`check`](Self::check) and
@@ -297,16 +301,27 @@ impl<A: Scalar> CheckedParams<A> {
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<Elm<A>> {
         let t = t.as_matrix();
-        let Drawn {
-            scaler,
-            hidden,
-            design,
-        } = self.draw(x.view(), t)?;
-        let solution = self
-            .0
-            .solver
-            .solve(&self.problem(&design, t, weights.as_ref())?)?;
-        Ok(Elm::assemble(scaler, hidden, self.0.direct_links, solution))
+        let (scaler, hidden) = self.prepare(x.view(), t)?;
+        if let Some(weights) = &weights {
+            check_some_weight(weights.view(), x.nrows())?;
+        }
+        let links = self.0.direct_links;
+        let layer = LayerRows::new(&hidden, scaler.as_ref(), links, x.view());
+        let mut source = RowSource {
+            hidden: HiddenRows::Layer(Box::new(layer)),
+            targets: t,
+            weights,
+            intercept: self.has_intercept(),
+        };
+        let solution = match self.0.solver.solve_rows(&mut source)? {
+            Some(solution) => solution,
+            None => {
+                let design = self.design(x.view(), scaler.as_ref(), &hidden)?;
+                let problem = self.problem(&design, t, weights.as_ref())?;
+                self.0.solver.solve(&problem)?
+            }
+        };
+        Ok(Elm::assemble(scaler, hidden, links, solution))
     }
 
     /// The random layer alone, for this many inputs: what a [`fit`](Self::fit) draws. Whoever keeps
@@ -380,23 +395,48 @@ impl<A: Scalar> CheckedParams<A> {
 
     /// Checks the data, draws the layer and applies it.
     pub(crate) fn draw(&self, x: ArrayView2<'_, A>, t: ArrayView2<'_, A>) -> Result<Drawn<A>> {
-        let params = &self.0;
-        check_matrix("inputs", x)?;
-        check_matrix("targets", t)?;
-        check_length("rows of targets", t.nrows(), x.nrows())?;
-
-        // Asked before anything is drawn, as a failed allocation would abort the program.
-        check_room("the hidden-layer matrix", x.nrows(), params.neurons())?;
-        let scaler = params.standardise.then(|| Scaler::measure(x));
-        let scaled = scaler.as_ref().map(|scaler| scaler.transform(x));
-        let x = scaled.as_ref().map_or(x, |scaled| scaled.view());
-        let hidden = self.layer(x)?;
-        let design = design(&hidden, params.direct_links, x);
+        let (scaler, hidden) = self.prepare(x, t)?;
+        let design = self.design(x, scaler.as_ref(), &hidden)?;
         Ok(Drawn {
             scaler,
             hidden,
             design,
         })
+    }
+
+    /// Checks the data and draws the layer.
+    fn prepare(
+        &self,
+        x: ArrayView2<'_, A>,
+        t: ArrayView2<'_, A>,
+    ) -> Result<(Option<Scaler<A>>, HiddenLayer<A>)> {
+        check_matrix("inputs", x)?;
+        check_matrix("targets", t)?;
+        check_length("rows of targets", t.nrows(), x.nrows())?;
+
+        // Asked before anything is drawn, as a failed allocation would abort the program. Where rows
+        // outnumber neurons the matrix itself may not be needed.
+        let neurons = self.0.neurons();
+        check_room("the hidden-layer matrix", x.nrows().min(neurons), neurons)?;
+        let scaler = self.0.standardise.then(|| Scaler::measure(x));
+        let hidden = match &scaler {
+            Some(scaler) if self.needs_rows() => self.layer(scaler.transform(x).view())?,
+            _ => self.layer(x)?,
+        };
+        Ok((scaler, hidden))
+    }
+
+    /// The hidden-layer matrix, with the inputs beside it where they are linked directly.
+    fn design(
+        &self,
+        x: ArrayView2<'_, A>,
+        scaler: Option<&Scaler<A>>,
+        hidden: &HiddenLayer<A>,
+    ) -> Result<Array2<A>> {
+        check_room("the hidden-layer matrix", x.nrows(), self.0.neurons())?;
+        let scaled = scaler.map(|scaler| scaler.transform(x));
+        let x = scaled.as_ref().map_or(x, |scaled| scaled.view());
+        Ok(design(hidden, self.0.direct_links, x))
     }
 
     pub(crate) fn problem<'a>(

@@ -195,19 +195,17 @@ fn solve_square<A: RealField + Copy + Zero + PartialEq>(
     Ok(x)
 }
 
-fn gram<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>) -> Array2<A> {
-    let n = a.ncols();
-    let mut out = Array2::zeros((n, n).f());
+fn add_gram<A: RealField + Copy>(a: ArrayView2<'_, A>, sum: &mut Array2<A>) {
     if a.is_empty() {
-        return out;
+        return;
     }
     let a = gapless(a);
     let a = view(a.view());
     // Half the work of a product.
     triangular::matmul(
-        view_mut(&mut out),
+        view_mut(sum),
         BlockStructure::TriangularLower,
-        Accum::Replace,
+        Accum::Add,
         a.transpose(),
         BlockStructure::Rectangular,
         a,
@@ -215,12 +213,6 @@ fn gram<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>) -> Array2<A> {
         faer::traits::math_utils::one(),
         PAR,
     );
-    for column in 1..n {
-        for row in 0..column {
-            out[[row, column]] = out[[column, row]];
-        }
-    }
-    out
 }
 
 fn solve_positive<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
@@ -278,8 +270,8 @@ macro_rules! kernel {
                 solve_square(a, b)
             }
 
-            fn gram(a: ArrayView2<'_, Self>) -> Array2<Self> {
-                gram(a)
+            fn add_gram(a: ArrayView2<'_, Self>, sum: &mut Array2<Self>) {
+                add_gram(a, sum);
             }
 
             fn solve_positive(

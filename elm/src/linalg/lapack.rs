@@ -3,6 +3,7 @@
 use std::ffi::c_int;
 use std::sync::Once;
 
+use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 use ndarray_linalg::error::LinalgError;
 use ndarray_linalg::{
@@ -132,9 +133,9 @@ macro_rules! kernel {
                 solve_square(a, b)
             }
 
-            fn gram(a: ArrayView2<'_, Self>) -> Array2<Self> {
+            fn add_gram(a: ArrayView2<'_, Self>, sum: &mut Array2<Self>) {
                 sequential();
-                a.t().dot(&a)
+                general_mat_mul(1.0, &a.t(), &a, 1.0, sum);
             }
 
             fn solve_positive(

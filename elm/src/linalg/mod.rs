@@ -8,11 +8,15 @@
 mod faer;
 #[cfg(feature = "openblas-system")]
 mod lapack;
+mod symmetric;
 
 #[cfg(not(any(feature = "faer", feature = "openblas-system")))]
 compile_error!("elm-learn needs a linear algebra back end: feature `faer` or `openblas-system`");
 
-use ndarray::{Array1, Array2, ArrayView2};
+use ndarray::{Array1, Array2, ArrayView2, ShapeBuilder};
+use num_traits::Zero;
+
+pub(crate) use symmetric::symmetric_product;
 
 /// The linear algebra back end that this build uses, `"faer"` or `"openblas"`.
 #[must_use]
@@ -92,8 +96,19 @@ pub trait Kernel: Sized {
         b: ArrayView2<'_, Self>,
     ) -> Result<Array2<Self>, Failure>;
 
-    /// $A^T A$, both halves.
-    fn gram(a: ArrayView2<'_, Self>) -> Array2<Self>;
+    /// Adds $A^T A$ to the lower half of `sum`, a square matrix that lies by columns. What the
+    /// upper half is afterwards is not said.
+    fn add_gram(a: ArrayView2<'_, Self>, sum: &mut Array2<Self>);
+
+    /// $A^T A$, of which the lower half is to be read, by columns.
+    fn gram(a: ArrayView2<'_, Self>) -> Array2<Self>
+    where
+        Self: Copy + Zero,
+    {
+        let mut sum = Array2::zeros((a.ncols(), a.ncols()).f());
+        Self::add_gram(a, &mut sum);
+        sum
+    }
 
     /// Solves $A X = B$ for symmetric positive definite $A$ by Cholesky. Only the lower half of
     /// `a` is read.
@@ -120,6 +135,10 @@ mod tests {
             StandardNormal,
             &mut ChaCha8Rng::seed_from_u64(seed),
         )
+    }
+
+    fn both_halves(lower: &Array2<f64>) -> Array2<f64> {
+        Array2::from_shape_fn(lower.dim(), |(i, j)| lower[[i.max(j), i.min(j)]])
     }
 
     const SHAPES: [(usize, usize); 8] = [
@@ -169,8 +188,11 @@ mod tests {
                 f64::solve_square(part, right).unwrap(),
                 f64::solve_square(copy.view(), right).unwrap()
             );
-            let positive = f64::gram(part);
-            assert_abs_diff_eq!(positive, copy.t().dot(&copy), epsilon = 1e-12);
+            assert_abs_diff_eq!(
+                both_halves(&f64::gram(part)),
+                copy.t().dot(&copy),
+                epsilon = 1e-12
+            );
             assert_eq!(f64::product(part, right), f64::product(copy.view(), right));
         }
     }
@@ -207,8 +229,11 @@ mod tests {
                 epsilon = 1e-10
             );
             let p = a.t().dot(&a);
-            assert_abs_diff_eq!(f64::gram(a.view()), p, epsilon = 1e-10);
-            assert_abs_diff_eq!(f64::gram(a.t()), a.dot(&a.t()), epsilon = 1e-10);
+            let mut gram = f64::gram(a.view());
+            assert_abs_diff_eq!(both_halves(&gram), p, epsilon = 1e-10);
+            f64::add_gram(a.t(), &mut gram);
+            let sum = &p + &a.dot(&a.t());
+            assert_abs_diff_eq!(both_halves(&gram), sum, epsilon = 1e-10);
             let solved = f64::solve_positive(p.view(), p.dot(&x).view()).unwrap();
             assert_abs_diff_eq!(solved.x, x, epsilon = 1e-9);
             let s = f64::singular_values(a.view()).unwrap();

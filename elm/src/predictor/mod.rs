@@ -5,6 +5,7 @@
 //! everything stays in the first-level cache. The hidden-layer matrix never exists as a whole.
 
 mod kernels;
+mod layer;
 mod packed;
 #[cfg(test)]
 mod tests;
@@ -20,6 +21,8 @@ use crate::simd::Level;
 use crate::solve::check_length;
 use kernels::{Accumulate, Project, row_blocks, sum_of_line};
 use packed::{Aligned, CHUNK_PANELS, Packed, Panels, zeros};
+
+pub(crate) use layer::LayerRows;
 
 /// Rows evaluated together.
 const TILE_ROWS: usize = 16;
@@ -379,12 +382,23 @@ fn multiply<A: Scalar>(inputs: &[A], scales: &[A], rows: usize, to: &mut [A]) {
 fn link<A: Scalar>(x: &[A], inputs: usize, rows: usize, first: usize, hidden: &mut [A]) {
     let length = hidden.len() / rows;
     hidden.fill(A::zero());
-    for (block, block_rows) in row_blocks(rows) {
-        let x = &x[block * inputs..(block + block_rows) * inputs];
-        for r in 0..block_rows {
-            let to = hidden.iter_mut().skip((block + r) * length).take(length);
-            let from = x.iter().skip(first * block_rows + r).step_by(block_rows);
-            to.zip(from).for_each(|(to, &from)| *to = from);
-        }
+    for (row, x) in tile_rows(x, inputs, rows) {
+        let to = hidden.iter_mut().skip(row * length).take(length);
+        to.zip(x.skip(first)).for_each(|(to, from)| *to = from);
     }
+}
+
+/// The rows of a tile of inputs, which lies in blocks of rows: (row, its inputs).
+fn tile_rows<A: Scalar>(
+    x: &[A],
+    inputs: usize,
+    rows: usize,
+) -> impl Iterator<Item = (usize, impl Iterator<Item = A>)> {
+    row_blocks(rows).flat_map(move |(first, block_rows)| {
+        let block = &x[first * inputs..(first + block_rows) * inputs];
+        (0..block_rows).map(move |r| {
+            let values = block.iter().skip(r).step_by(block_rows).copied();
+            (first + r, values)
+        })
+    })
 }

@@ -1,6 +1,6 @@
 //! What is done to a problem before it is factorised, and how its answer is brought back.
 
-use ndarray::{Array1, Array2, ArrayView2, Axis, Zip};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip};
 
 use super::LeastSquares;
 use crate::scalar::Scalar;
@@ -26,6 +26,27 @@ pub(crate) struct Frame<A: Scalar> {
 }
 
 impl<A: Scalar> Frame<A> {
+    /// What the weights alone say; of means and scales there are none yet.
+    pub(crate) fn of_weights(
+        rows: usize,
+        weights: Option<&ArrayView1<'_, A>>,
+        intercept: bool,
+    ) -> Self {
+        let (weight_scale, weights) = unit_weights(rows, weights);
+        Self {
+            rows,
+            weighted_rows: weights.iter().filter(|w| **w > A::zero()).count(),
+            intercept,
+            total_weight: weights.sum(),
+            root_weights: weights.mapv_into(A::sqrt),
+            weight_scale,
+            hidden_mean: Array1::zeros(0),
+            target_mean: Array1::zeros(0),
+            hidden_scale: A::one(),
+            target_scale: Array1::zeros(0),
+        }
+    }
+
     /// The unit vector that an intercept spans among the weighted rows,
     /// $\sqrt{w_i / \sum w}$; all 0 without one.
     pub(crate) fn constant_direction(&self) -> Array1<A> {
@@ -89,22 +110,14 @@ pub(crate) struct Prepared<A: Scalar> {
 impl<A: Scalar> Prepared<A> {
     pub(crate) fn new(problem: &LeastSquares<'_, A>) -> Self {
         let rows = problem.rows();
-        // Largest weight 1, so that 1e300 and 1e-300 are as good as 1.
-        let weight_scale = problem.weights.map_or(A::one(), |weights| {
-            weights.iter().fold(A::zero(), |m, w| m.max(*w))
-        });
-        let weights = match &problem.weights {
-            Some(weights) => weights.mapv(|w| w / weight_scale),
-            None => Array1::ones(rows),
-        };
-        let total_weight = weights.sum();
-        let weighted_rows = weights.iter().filter(|w| **w > A::zero()).count();
-        let root_weights = weights.mapv(A::sqrt);
+        let frame = Frame::of_weights(rows, problem.weights.as_ref(), problem.intercept);
+        let (_, weights) = unit_weights(rows, problem.weights.as_ref());
+        let (total_weight, root_weights) = (frame.total_weight, &frame.root_weights);
 
-        let largest = weighted_magnitudes(problem.hidden, &root_weights);
+        let largest = weighted_magnitudes(problem.hidden, root_weights);
         let mut hidden_scale = power_of_two(largest.iter().fold(A::zero(), |m, x| m.max(*x)));
         let mut target_scale =
-            weighted_magnitudes(problem.targets, &root_weights).mapv_into(power_of_two);
+            weighted_magnitudes(problem.targets, root_weights).mapv_into(power_of_two);
         let mut hidden = problem.hidden.mapv(|h| h / hidden_scale);
         let mut targets = &problem.targets / &target_scale;
         for (row, weight) in weights.iter().enumerate() {
@@ -143,16 +156,11 @@ impl<A: Scalar> Prepared<A> {
             }
         }
         let frame = Frame {
-            rows,
-            weighted_rows,
-            intercept: problem.intercept,
-            root_weights,
-            weight_scale,
-            total_weight,
             hidden_mean,
             target_mean,
             hidden_scale,
             target_scale,
+            ..frame
         };
         Self {
             hidden,
@@ -162,8 +170,20 @@ impl<A: Scalar> Prepared<A> {
     }
 }
 
+/// The largest weight, and all divided by it: 1e300 and 1e-300 are then as good as 1.
+fn unit_weights<A: Scalar>(rows: usize, weights: Option<&ArrayView1<'_, A>>) -> (A, Array1<A>) {
+    let Some(weights) = weights else {
+        return (A::one(), Array1::ones(rows));
+    };
+    let largest = weights.iter().fold(A::zero(), |m, w| m.max(*w));
+    (largest, weights.mapv(|w| w / largest))
+}
+
 /// For each column the largest $\sqrt{w_i} |a_{ij}|$.
-fn weighted_magnitudes<A: Scalar>(matrix: ArrayView2<'_, A>, roots: &Array1<A>) -> Array1<A> {
+pub(crate) fn weighted_magnitudes<A: Scalar>(
+    matrix: ArrayView2<'_, A>,
+    roots: &Array1<A>,
+) -> Array1<A> {
     let mut largest = Array1::zeros(matrix.ncols());
     for (row, &root) in matrix.rows().into_iter().zip(roots) {
         Zip::from(&mut largest).and(row).for_each(|m: &mut A, &x| {

@@ -6,26 +6,92 @@
 //! (Higham, Accuracy and Stability of Numerical Algorithms, 2002, ch. 10 and 20), for half the
 //! arithmetic of QR and a small part of its memory traffic. A matrix with fewer rows than neurons
 //! is answered from $\tilde H \tilde H^T$ (the dual form), $\beta = \tilde H^T (\tilde H \tilde H^T
-//! + \lambda s_1^2 I)^{-1} \tilde T$.
+//! + \lambda s_1^2 I)^{-1} \tilde T$. With at least as many rows as neurons the matrix itself is not
+//! needed: [`Moments`] adds up its products tile by tile.
 
-use ndarray::{Array1, Array2, Axis};
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use ndarray::{Array1, Array2};
 
 use super::Solution;
 use super::diagnosis::{Diagnosis, Reason, Route};
 use super::frame::{Frame, Prepared};
+use super::lanczos::largest_eigenvalue;
+use super::moments::{Moments, RowSource};
 use super::spectrum::norm;
-use crate::linalg::Positive;
+use crate::error::Result;
+use crate::linalg::{Positive, symmetric_product};
 use crate::scalar::Scalar;
+
+/// The relative error that output weights may have by this route.
+fn accuracy<A: Scalar>() -> f64 {
+    if A::epsilon().as_f64() < 1e-10 {
+        1e-8
+    } else {
+        1e-3
+    }
+}
 
 /// Whether this strength allows the route: errors of about $\epsilon / \lambda$ must stay below
 /// 1e-8 in `f64` and 1e-3 in `f32`.
 pub(super) fn allowed<A: Scalar>(lambda: f64) -> bool {
-    let epsilon = A::epsilon().as_f64();
-    let accuracy = if epsilon < 1e-10 { 1e-8 } else { 1e-3 };
     // The upper bound keeps the diagonal far from overflow in either type.
-    lambda * accuracy >= epsilon && lambda <= 1e6
+    lambda * accuracy::<A>() >= A::epsilon().as_f64() && lambda <= 1e6
+}
+
+/// The ridge solution of a problem with at least as many rows as neurons, whose hidden-layer
+/// matrix need never be there as a whole; or nothing where its numbers are beyond this route: out
+/// of range, all zeros, or with means so far from the first rows that centring would cost digits.
+///
+/// # Errors
+/// Those of making the rows.
+pub(super) fn solve_rows<A: Scalar>(
+    source: &mut RowSource<'_, A>,
+    lambda: f64,
+) -> Result<Option<Solution<A>>> {
+    if source.rows() < source.neurons() {
+        return Ok(None);
+    }
+    let moments = Moments::gather(source)?;
+    if !moments.in_range() {
+        return Ok(None);
+    }
+    let Some(largest) = largest_eigenvalue(&moments.gram) else {
+        return Ok(None);
+    };
+    // With the correction c, errors are about epsilon (1 + c / s_1^2) / lambda.
+    let reserve = lambda * accuracy::<A>() / A::epsilon().as_f64() - 1.0;
+    if moments.correction > largest * A::from_f64(reserve.clamp(0.0, 1.0)) {
+        return Ok(None);
+    }
+    let absolute = A::from_f64(lambda) * largest;
+    let mut shifted = moments.gram.clone();
+    let mut diagonal = shifted.diag_mut();
+    diagonal += absolute;
+    let Ok(solved) = A::solve_positive(shifted.view(), moments.right.view()) else {
+        return Ok(None);
+    };
+    let Positive { x, inverse_trace } = solved;
+    // |t - H b|^2 from the sums, where it is not a small difference of large numbers.
+    let mut squares = Array1::zeros(x.ncols());
+    for (output, square) in squares.iter_mut().enumerate() {
+        let (beta, right) = (x.column(output).to_owned(), moments.right.column(output));
+        let fitted = symmetric_product(&moments.gram, &beta);
+        *square = moments.squares[output] - beta.dot(&(&right * A::from_f64(2.0) - fitted));
+    }
+    let trusted = A::from_f64(100.0) * A::epsilon().sqrt();
+    let small = |(&square, &whole): (&A, &A)| square < trusted * whole || whole == A::zero();
+    if squares.iter().zip(&moments.squares).any(small) {
+        squares = moments.residual_squares(source, &x)?;
+    }
+    let norms = squares.iter().map(|s| s.as_f64().sqrt());
+    let kept = source.neurons() as f64 - (absolute * inverse_trace).as_f64();
+    let found = Found {
+        beta: x,
+        route: Route::Gram,
+        lambda,
+        largest: largest.sqrt(),
+        kept,
+    };
+    Ok(Some(found.solution(&moments.frame, norms)))
 }
 
 /// The ridge solution, or nothing where the matrix turns out to be beyond this route (all zeros).
@@ -56,124 +122,52 @@ pub(super) fn solve<A: Scalar>(prepared: &Prepared<A>, lambda: f64) -> Option<So
         let residual = targets - &A::product(hidden.view(), x.view());
         (x, residual, inverse_trace)
     };
-    // The trace of G (G + l)^-1.
-    let kept = gram.nrows() as f64 - (absolute * inverse_trace).as_f64();
-    let route = if dual { Route::DualGram } else { Route::Gram };
-    Some(finish(
-        frame,
+    let found = Found {
         beta,
-        &residual,
-        route,
+        route: if dual { Route::DualGram } else { Route::Gram },
         lambda,
-        largest.sqrt(),
-        kept,
-    ))
+        largest: largest.sqrt(),
+        // The trace of G (G + l)^-1.
+        kept: gram.nrows() as f64 - (absolute * inverse_trace).as_f64(),
+    };
+    Some(found.solution(frame, residual.columns().into_iter().map(norm)))
 }
 
-fn finish<A: Scalar>(
-    frame: &Frame<A>,
+/// What either form of the route finds, of the scaled problem.
+struct Found<A: Scalar> {
     beta: Array2<A>,
-    residual: &Array2<A>,
     route: Route,
     lambda: f64,
+    /// The largest singular value.
     largest: A,
+    /// Degrees of freedom without the intercept.
     kept: f64,
-) -> Solution<A> {
-    let outputs = beta.ncols();
-    let beta = frame.restore(beta);
-    let intercept = frame.constant(&beta);
-    let constant = f64::from(u8::from(frame.intercept));
-    let diagnosis = Diagnosis {
-        route,
-        reason: Reason::StrongRidge,
-        rank: None,
-        condition: None,
-        largest_singular_value: frame.outer_singular_value(largest),
-        smallest_singular_value: None,
-        lambda: vec![lambda; outputs],
-        degrees_of_freedom: vec![kept.max(0.0) + constant; outputs],
-        residual_norm: frame.outer_residual_norms(residual.columns().into_iter().map(norm)),
-        beta_norm: beta.columns().into_iter().map(norm).collect(),
-        leave_one_out: None,
-    };
-    Solution {
-        beta,
-        intercept,
-        diagnosis,
-    }
 }
 
-/// The largest eigenvalue of a symmetric matrix without negative ones, to 1e-10 of itself (32
-/// epsilon in `f32`), by Lanczos iteration with full reorthogonalisation; `None` for a zero
-/// matrix.
-///
-/// An eigenvalue lies within the residual of the Ritz value (Parlett, The Symmetric Eigenvalue
-/// Problem, 1998, ch. 4 and 13); a random start makes it the largest.
-fn largest_eigenvalue<A: Scalar>(matrix: &Array2<A>) -> Option<A> {
-    const STEPS: usize = 80;
-    let n = matrix.nrows();
-    let tolerance = A::from_f64(1e-10).max(A::from_f64(32.0) * A::epsilon());
-    let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let start = Array1::from_shape_simple_fn(n, || A::from_f64(rng.random_range(-1.0..1.0)));
-    let mut basis = Array2::<A>::zeros((STEPS.min(n), n));
-    // The tridiagonal projection of the matrix onto the basis.
-    let mut small = Array2::<A>::zeros((STEPS.min(n), STEPS.min(n)));
-    let mut next = &start / start.dot(&start).sqrt();
-    for step in 0..STEPS.min(n) {
-        basis.row_mut(step).assign(&next);
-        next = A::product(matrix.view(), next.view().insert_axis(Axis(1))).remove_axis(Axis(1));
-        small[[step, step]] = basis.row(step).dot(&next);
-        let known = basis.slice(ndarray::s![..=step, ..]);
-        for _ in 0..2 {
-            let shares = known.dot(&next);
-            next -= &shares.dot(&known);
+impl<A: Scalar> Found<A> {
+    /// In the problem's own units; `norms` are those of the residuals.
+    fn solution(self, frame: &Frame<A>, norms: impl Iterator<Item = f64>) -> Solution<A> {
+        let outputs = self.beta.ncols();
+        let beta = frame.restore(self.beta);
+        let intercept = frame.constant(&beta);
+        let constant = f64::from(u8::from(frame.intercept));
+        let diagnosis = Diagnosis {
+            route: self.route,
+            reason: Reason::StrongRidge,
+            rank: None,
+            condition: None,
+            largest_singular_value: frame.outer_singular_value(self.largest),
+            smallest_singular_value: None,
+            lambda: vec![self.lambda; outputs],
+            degrees_of_freedom: vec![self.kept.max(0.0) + constant; outputs],
+            residual_norm: frame.outer_residual_norms(norms),
+            beta_norm: beta.columns().into_iter().map(norm).collect(),
+            leave_one_out: None,
+        };
+        Solution {
+            beta,
+            intercept,
+            diagnosis,
         }
-        let rest = next.dot(&next).sqrt();
-        let last = step + 1 == STEPS.min(n);
-        if step % 4 == 3 || last || rest == A::zero() {
-            let projected = small.slice(ndarray::s![..=step, ..=step]);
-            let svd = A::svd(projected).ok()?;
-            let (value, share) = (svd.s[0], svd.vt[[0, step]].abs());
-            if value == A::zero() {
-                return None;
-            }
-            if rest * share <= tolerance * value {
-                return Some(value);
-            }
-        }
-        if !last {
-            small[[step, step + 1]] = rest;
-            small[[step + 1, step]] = rest;
-            next /= rest;
-        }
-    }
-    // Many eigenvalues crowd at the top: all of them, then.
-    let all = A::singular_values(matrix.view()).ok()?;
-    (all[0] > A::zero()).then_some(all[0])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::linalg::Kernel;
-    use ndarray_rand::RandomExt;
-    use ndarray_rand::rand_distr::StandardNormal;
-
-    #[test]
-    fn the_largest_eigenvalue_is_the_squared_singular_value() {
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
-        for (rows, columns) in [(1, 1), (5, 2), (60, 59), (300, 100), (120, 119)] {
-            let a: Array2<f64> = Array2::random_using((rows, columns), StandardNormal, &mut rng);
-            let found = largest_eigenvalue(&f64::gram(a.view())).unwrap();
-            let s = f64::singular_values(a.view()).unwrap()[0];
-            approx::assert_relative_eq!(found, s * s, max_relative = 1e-10);
-        }
-        // All equal, and none at all.
-        assert_eq!(largest_eigenvalue(&Array2::<f64>::eye(200)), Some(1.0));
-        assert_eq!(largest_eigenvalue(&Array2::<f64>::zeros((9, 9))), None);
-        // 1 and 1 - 1e-12 many times: nothing to tell apart, and either is right to 1e-10.
-        let crowd = Array1::from_shape_fn(300, |i| 1.0 - i as f64 * 1e-3);
-        let found = largest_eigenvalue(&Array2::from_diag(&crowd)).unwrap();
-        approx::assert_relative_eq!(found, 1.0, max_relative = 1e-10);
     }
 }

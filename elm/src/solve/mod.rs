@@ -27,6 +27,8 @@ mod diagnosis;
 pub(crate) mod frame;
 mod gram;
 mod inverse;
+mod lanczos;
+pub(crate) mod moments;
 mod pseudo_inverse;
 mod ridge;
 pub(crate) mod spectrum;
@@ -40,6 +42,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::linalg::Failure;
 use crate::scalar::Scalar;
+use moments::RowSource;
 use spectrum::Spectrum;
 
 pub use diagnosis::{Diagnosis, Reason, Route};
@@ -84,10 +87,7 @@ impl<'a, A: Scalar> LeastSquares<'a, A> {
     /// [`Error::Shape`] when there is not one weight per row, [`Error::Parameter`] when one is
     /// negative or not finite or when all are 0.
     pub fn weights(mut self, weights: &'a ArrayRef1<A>) -> Result<Self> {
-        check_weights(weights.view(), self.hidden.nrows())?;
-        if weights.iter().all(|w| *w == A::zero()) {
-            return Err(weight_error(0.0));
-        }
+        check_some_weight(weights.view(), self.hidden.nrows())?;
         self.weights = Some(weights.view());
         Ok(self)
     }
@@ -134,6 +134,15 @@ pub(crate) fn check_weights<A: Scalar>(weights: ArrayView1<'_, A>, rows: usize) 
         Some(bad) => Err(weight_error(bad.as_f64())),
         None => Ok(()),
     }
+}
+
+/// As [`check_weights`], and not all zero.
+pub(crate) fn check_some_weight<A: Scalar>(weights: ArrayView1<'_, A>, rows: usize) -> Result<()> {
+    check_weights(weights, rows)?;
+    if weights.iter().all(|w| *w == A::zero()) {
+        return Err(weight_error(0.0));
+    }
+    Ok(())
 }
 
 fn weight_error(value: f64) -> Error {
@@ -196,6 +205,18 @@ impl Solver {
             Self::PseudoInverse(solver) => solver.solve(problem),
             Self::Ridge(solver) => solver.solve(problem),
         }?)
+    }
+
+    /// Solves a problem whose hidden-layer matrix is made as it is needed, or nothing where that
+    /// takes the matrix itself.
+    pub(crate) fn solve_rows<A: Scalar>(
+        &self,
+        source: &mut RowSource<'_, A>,
+    ) -> Result<Option<Solution<A>>> {
+        match self {
+            Self::Ridge(solver) => solver.solve_rows(source)?.map(in_range).transpose(),
+            Self::Inverse(_) | Self::PseudoInverse(_) => Ok(None),
+        }
     }
 
     /// Solves a problem that is known only by its spectrum.
@@ -313,6 +334,10 @@ pub(crate) fn check_matrix<A: Scalar>(what: &'static str, a: ArrayView2<'_, A>) 
             rows,
             columns,
         });
+    }
+    // A question without places is answered several values at a time.
+    if a.iter().fold(true, |all, value| all & value.is_finite()) {
+        return Ok(());
     }
     match a.indexed_iter().find(|(_, value)| !value.is_finite()) {
         Some(((row, column), _)) => Err(Error::NotFinite { what, row, column }),

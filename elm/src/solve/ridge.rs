@@ -1,10 +1,11 @@
 //! Regularised least squares: $\beta = \arg\min \lVert H\beta - T\rVert^2 + \lambda
 //! s_1^2 \lVert\beta\rVert^2$.
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
 use serde::{Deserialize, Serialize};
 
 use super::frame::Prepared;
+use super::moments::{HiddenRows, RowSource};
 use super::spectrum::{RowSpectrum, Spectrum};
 use super::{LeastSquares, Reason, Solution, gram};
 use crate::error::{Error, Result};
@@ -116,6 +117,15 @@ impl Ridge {
     pub(super) fn solve<A: Scalar>(self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
         match self.lambda {
             Lambda::Relative(lambda) => {
+                let mut source = RowSource {
+                    hidden: HiddenRows::Matrix(problem.hidden),
+                    targets: problem.targets,
+                    weights: problem.weights,
+                    intercept: problem.intercept,
+                };
+                if let Some(solution) = self.solve_rows(&mut source)? {
+                    return Ok(solution);
+                }
                 let prepared = Prepared::new(problem);
                 if gram::allowed::<A>(lambda)
                     && let Some(solution) = gram::solve(&prepared, lambda)
@@ -136,6 +146,20 @@ impl Ridge {
                 };
                 Ok(self.search(&wide, unit_roundoff::<A>())?.narrow())
             }
+        }
+    }
+
+    /// The answer where a given strength allows the normal equations and there are at least as
+    /// many rows as neurons.
+    pub(super) fn solve_rows<A: Scalar>(
+        self,
+        source: &mut RowSource<'_, A>,
+    ) -> Result<Option<Solution<A>>> {
+        match self.lambda {
+            Lambda::Relative(lambda) if gram::allowed::<A>(lambda) => {
+                gram::solve_rows(source, lambda)
+            }
+            _ => Ok(None),
         }
     }
 
@@ -325,29 +349,50 @@ fn gcv_scores<A: Scalar>(spectrum: &Spectrum<A>, candidates: &[f64], roundoff: f
 /// The share of a score that rounding errors must have for them to be looked at closely.
 const NEGLIGIBLE: f64 = 1e-6;
 
+/// Rows whose leave-one-out residuals are computed together, for all candidates.
+const SCORED_ROWS: usize = 256;
+
 /// The sum of squared leave-one-out residuals, and of what rounding is to add to them, for each
 /// candidate and output, shape (candidates, outputs), in units of the scaled targets.
+///
+/// Rows pass by once, a block of them for all candidates: products of matrices, where a candidate
+/// by itself would read all rows for a product with a vector.
 fn leave_one_out_scores<A: Scalar>(
     rows: &RowSpectrum<A>,
     candidates: &[f64],
     roundoff: f64,
 ) -> Array2<f64> {
-    let mut scores = Array2::zeros((candidates.len(), rows.spectrum.c.ncols()));
-    let squared = rows.u.mapv(|u| u * u);
-    for (mut score, &lambda) in scores.rows_mut().into_iter().zip(candidates) {
-        let held_back = rows.spectrum.ridge_held_back(A::from_f64(lambda));
-        let residuals = rows.leave_one_out(
-            &(squared.dot(&held_back) + &rows.free),
-            &held_back,
-            rows.spectrum.c.view(),
-            rows.residual.view(),
-        );
-        for (score, column) in score.iter_mut().zip(residuals.columns()) {
-            *score = column.iter().map(|e| e.as_f64().powi(2)).sum();
+    let spectrum = &rows.spectrum;
+    let mut scores = Array2::zeros((candidates.len(), spectrum.c.ncols()));
+    // Shape (directions, candidates).
+    let mut held_back = Array2::zeros((spectrum.s.len(), candidates.len()));
+    for (mut column, &lambda) in held_back.columns_mut().into_iter().zip(candidates) {
+        column.assign(&spectrum.ridge_held_back(A::from_f64(lambda)));
+    }
+    for first in (0..rows.u.nrows()).step_by(SCORED_ROWS) {
+        let block = s![first..rows.u.nrows().min(first + SCORED_ROWS), ..];
+        let u = rows.u.slice(block);
+        let squared = u.mapv(|u| u * u);
+        let mut denominators = A::product(squared.view(), held_back.view());
+        let free = rows.free.slice(s![first..first + u.nrows()]);
+        denominators += &free.insert_axis(Axis(1));
+        let residual = rows.residual.slice(block);
+        for (output, mut score) in scores.columns_mut().into_iter().enumerate() {
+            let held = &held_back * &spectrum.c.slice(s![.., output..=output]);
+            let mut residuals = A::product(u, held.view());
+            residuals += &residual.slice(s![.., output..=output]);
+            residuals /= &denominators;
+            for row in residuals.rows() {
+                Zip::from(&mut score)
+                    .and(row)
+                    .for_each(|score, e| *score += e.as_f64().powi(2));
+            }
         }
-        let kept = rows.spectrum.ridge_kept(A::from_f64(lambda));
+    }
+    for (mut score, &lambda) in scores.rows_mut().into_iter().zip(candidates) {
+        let kept = spectrum.ridge_kept(A::from_f64(lambda));
         let negligible = |o: usize| NEGLIGIBLE * score[o];
-        let rounding = rows.spectrum.rounding_squares(&kept, roundoff, negligible);
+        let rounding = spectrum.rounding_squares(&kept, roundoff, negligible);
         for (score, rounding) in score.iter_mut().zip(rounding) {
             *score += rounding;
         }

@@ -1,0 +1,326 @@
+//! Sums of products of all columns, hidden and target, over rows that exist a tile at a time.
+//!
+//! Columns are taken less a value near their mean, so that centring them for an intercept is a
+//! small correction afterwards (Chan, Golub and LeVeque, Algorithms for Computing the Sample
+//! Variance, 1983, section 3, for one column); the correction's size is known, and with it what
+//! it costs in digits.
+
+use std::ops::Range;
+
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, ShapeBuilder, s};
+
+use super::frame::{Frame, power_of_two, weighted_magnitudes};
+use crate::error::Result;
+use crate::predictor::LayerRows;
+use crate::scalar::Scalar;
+
+/// Where the rows of a hidden-layer matrix come from.
+pub(crate) enum HiddenRows<'a, A: Scalar> {
+    /// From the inputs, as they are needed.
+    Layer(Box<LayerRows<'a, A>>),
+    /// From the matrix itself.
+    Matrix(ArrayView2<'a, A>),
+}
+
+impl<A: Scalar> HiddenRows<'_, A> {
+    fn rows(&self) -> usize {
+        match self {
+            Self::Layer(layer) => layer.rows(),
+            Self::Matrix(matrix) => matrix.nrows(),
+        }
+    }
+
+    fn columns(&self) -> usize {
+        match self {
+            Self::Layer(layer) => layer.columns(),
+            Self::Matrix(matrix) => matrix.ncols(),
+        }
+    }
+
+    /// A power of two that brings the matrix into the middle of the range. The values of a layer
+    /// are there already, or its sums are found to be out of range.
+    fn scale(&self, root_weights: &Array1<A>) -> A {
+        match self {
+            Self::Layer(_) => A::one(),
+            Self::Matrix(matrix) => {
+                let largest = weighted_magnitudes(*matrix, root_weights);
+                power_of_two(largest.iter().fold(A::zero(), |m, x| m.max(*x)))
+            }
+        }
+    }
+
+    /// Writes rows divided by `scale`, less `shift`.
+    fn write(
+        &mut self,
+        rows: Range<usize>,
+        scale: A,
+        shift: &[A],
+        to: &mut [A],
+        stride: usize,
+    ) -> Result<()> {
+        match self {
+            Self::Layer(layer) => layer.write(rows, shift, to, stride)?,
+            Self::Matrix(matrix) => {
+                let rows = matrix.slice(s![rows, ..]);
+                for (row, to) in rows.rows().into_iter().zip(to.chunks_mut(stride)) {
+                    for ((to, &value), &shift) in to.iter_mut().zip(row).zip(shift) {
+                        *to = value / scale - shift;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The rows of a problem, whose hidden part need not exist yet.
+pub(crate) struct RowSource<'a, A: Scalar> {
+    pub(crate) hidden: HiddenRows<'a, A>,
+    pub(crate) targets: ArrayView2<'a, A>,
+    pub(crate) weights: Option<ArrayView1<'a, A>>,
+    pub(crate) intercept: bool,
+}
+
+/// Bytes in a tile: it stays in the second-level or third-level cache between being written and
+/// being multiplied, and has enough rows that adding its product to the sums costs little.
+const TILE_BYTES: usize = 1 << 21;
+
+impl<A: Scalar> RowSource<'_, A> {
+    pub(crate) fn rows(&self) -> usize {
+        self.hidden.rows()
+    }
+
+    pub(crate) fn neurons(&self) -> usize {
+        self.hidden.columns()
+    }
+
+    fn outputs(&self) -> usize {
+        self.targets.ncols()
+    }
+
+    /// Of a row of a tile: hidden values, targets, and a one where there is an intercept.
+    fn width(&self) -> usize {
+        self.neurons() + self.outputs() + usize::from(self.intercept)
+    }
+
+    fn tile_rows(&self) -> usize {
+        let rows = TILE_BYTES / size_of::<A>() / self.width();
+        rows.clamp(64, 1024).min(self.rows())
+    }
+
+    /// Writes a tile: rows divided by their scales and less `shift`, all times the root of the
+    /// row's weight. A row of weight 0 may hold anything, even what overflows; it becomes 0.
+    fn write(
+        &mut self,
+        rows: Range<usize>,
+        frame: &Frame<A>,
+        shift: &[A],
+        to: &mut [A],
+    ) -> Result<()> {
+        let (neurons, width) = (self.neurons(), self.width());
+        let (hidden_shift, target_shift) = shift.split_at(neurons);
+        let scale = frame.hidden_scale;
+        self.hidden
+            .write(rows.clone(), scale, hidden_shift, to, width)?;
+        let targets = self.targets.slice(s![rows.clone(), ..]);
+        let roots = frame.root_weights.slice(s![rows]);
+        for ((to, targets), &root) in to.chunks_exact_mut(width).zip(targets.rows()).zip(roots) {
+            if root == A::zero() {
+                to.fill(A::zero());
+                continue;
+            }
+            let rest = &mut to[neurons..];
+            for (((to, &target), &scale), &shift) in rest
+                .iter_mut()
+                .zip(targets)
+                .zip(&frame.target_scale)
+                .zip(target_shift)
+            {
+                *to = target / scale - shift;
+            }
+            if self.intercept {
+                to[width - 1] = A::one();
+            }
+            if root != A::one() {
+                to.iter_mut().for_each(|value| *value *= root);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A problem as its normal equations: rows weighted, columns centred where there is an intercept.
+pub(crate) struct Moments<A: Scalar> {
+    /// $\tilde H^T \tilde H$, the lower half, by columns.
+    pub(crate) gram: Array2<A>,
+    /// $\tilde H^T \tilde T$.
+    pub(crate) right: Array2<A>,
+    /// The sum of squares of each column of $\tilde T$.
+    pub(crate) squares: Array1<A>,
+    /// What centring took out of the sums, as a share of the smallest thing that it may matter
+    /// beside: $n \lVert \delta \rVert^2$ for $\delta$ the distance of the means from where the columns
+    /// were shifted to.
+    pub(crate) correction: A,
+    pub(crate) frame: Frame<A>,
+    /// What was taken off hidden and target columns, these in units of their scale.
+    shift: Vec<A>,
+}
+
+impl<A: Scalar> Moments<A> {
+    /// Adds up all rows.
+    ///
+    /// # Errors
+    /// Those of making the rows.
+    pub(crate) fn gather(source: &mut RowSource<'_, A>) -> Result<Self> {
+        let (rows, neurons, outputs) = (source.rows(), source.neurons(), source.outputs());
+        let mut frame = Frame::of_weights(rows, source.weights.as_ref(), source.intercept);
+        frame.target_scale =
+            weighted_magnitudes(source.targets, &frame.root_weights).mapv_into(power_of_two);
+        frame.hidden_scale = source.hidden.scale(&frame.root_weights);
+        frame.hidden_mean = Array1::zeros(neurons);
+        frame.target_mean = Array1::zeros(outputs);
+
+        let (width, tile_rows) = (source.width(), source.tile_rows());
+        let mut tile = vec![A::zero(); tile_rows * width];
+        let mut shift = vec![A::zero(); neurons + outputs];
+        let mut sums = Array2::zeros((width, width).f());
+        for first in (0..rows).step_by(tile_rows) {
+            let range = first..rows.min(first + tile_rows);
+            let tile = &mut tile[..range.len() * width];
+            source.write(range.clone(), &frame, &shift, tile)?;
+            if first == 0 && source.intercept {
+                shift = centre_of(tile, width, &frame.root_weights);
+                source.write(range, &frame, &shift, tile)?;
+            }
+            if let Ok(tile) = ArrayView2::from_shape((tile.len() / width, width), tile) {
+                A::add_gram(tile, &mut sums);
+            }
+        }
+        Ok(Self::of_sums(&sums, frame, shift))
+    }
+
+    fn of_sums(sums: &Array2<A>, mut frame: Frame<A>, shift: Vec<A>) -> Self {
+        let (neurons, outputs) = (frame.hidden_mean.len(), frame.target_mean.len());
+        let mut gram = Array2::zeros((neurons, neurons).f());
+        gram.assign(&sums.slice(s![..neurons, ..neurons]));
+        let targets = neurons..neurons + outputs;
+        let mut right = sums.slice(s![targets.clone(), ..neurons]).t().to_owned();
+        let mut squares = sums.diag().slice(s![targets.clone()]).to_owned();
+        let mut correction = A::zero();
+        if frame.intercept {
+            let totals = sums.row(neurons + outputs);
+            // The distance of the mean from the shift; the number of rows is a sum, too.
+            let distance = &totals.slice(s![..neurons + outputs]) / frame.total_weight;
+            let (hidden, target) = distance.view().split_at(Axis(0), neurons);
+            for (j, mut column) in gram.columns_mut().into_iter().enumerate() {
+                let factor = hidden[j] * frame.total_weight;
+                let mut below = column.slice_mut(s![j..]);
+                below.scaled_add(-factor, &hidden.slice(s![j..]));
+            }
+            for (mut column, &target) in right.columns_mut().into_iter().zip(target) {
+                column.scaled_add(-target * frame.total_weight, &hidden);
+            }
+            squares.scaled_add(-frame.total_weight, &target.mapv(|t| t * t));
+            correction = hidden.dot(&hidden) * frame.total_weight;
+            let mean = &ArrayView1::from(&shift) + &distance;
+            let (hidden, target) = mean.view().split_at(Axis(0), neurons);
+            frame.hidden_mean = &hidden * frame.hidden_scale;
+            frame.target_mean = &target * &frame.target_scale;
+        }
+        Self {
+            gram,
+            right,
+            squares: squares.mapv_into(|s| s.max(A::zero())),
+            correction,
+            frame,
+            shift,
+        }
+    }
+
+    /// Whether the sums are those of numbers in the middle of the type's range.
+    pub(crate) fn in_range(&self) -> bool {
+        let bound = A::max_value().sqrt();
+        let largest = self
+            .gram
+            .diag()
+            .fold(A::zero(), |m, &d| if d > m { d } else { m });
+        let finite = |d: &A| d.is_finite();
+        largest < bound
+            && largest > bound.recip()
+            && self.gram.diag().iter().all(finite)
+            && self.right.iter().all(finite)
+            && self.squares.iter().all(finite)
+    }
+
+    /// The squared norm of the residual of each output with these weights (of the scaled problem),
+    /// from the rows themselves: one more pass, without the sums of products.
+    ///
+    /// # Errors
+    /// Those of making the rows.
+    pub(crate) fn residual_squares(
+        &self,
+        source: &mut RowSource<'_, A>,
+        beta: &Array2<A>,
+    ) -> Result<Array1<A>> {
+        let (rows, neurons, outputs) = (source.rows(), source.neurons(), source.outputs());
+        let (width, tile_rows) = (source.width(), source.tile_rows());
+        let mut tile = vec![A::zero(); tile_rows * width];
+        let mut squares = Array1::zeros(outputs);
+        // What the shifted rows are still short of being centred.
+        let scaled = &self.frame.target_mean / &self.frame.target_scale;
+        let constant = if self.frame.intercept {
+            let hidden = &self.frame.hidden_mean / self.frame.hidden_scale
+                - ArrayView1::from(&self.shift[..neurons]);
+            scaled - &ArrayView1::from(&self.shift[neurons..]) - hidden.dot(beta)
+        } else {
+            Array1::zeros(outputs)
+        };
+        for first in (0..rows).step_by(tile_rows) {
+            let range = first..rows.min(first + tile_rows);
+            let tile = &mut tile[..range.len() * width];
+            source.write(range.clone(), &self.frame, &self.shift, tile)?;
+            let Ok(tile) = ArrayView2::from_shape((range.len(), width), tile) else {
+                continue;
+            };
+            let fitted = A::product(tile.slice(s![.., ..neurons]), beta.view());
+            let targets = tile.slice(s![.., neurons..neurons + outputs]);
+            let roots = self.frame.root_weights.slice(s![range]);
+            for ((fitted, targets), &root) in
+                fitted.rows().into_iter().zip(targets.rows()).zip(roots)
+            {
+                for (((sum, &f), &t), &c) in
+                    squares.iter_mut().zip(fitted).zip(targets).zip(&constant)
+                {
+                    let rest = t - f - c * root;
+                    *sum += rest * rest;
+                }
+            }
+        }
+        Ok(squares)
+    }
+}
+
+/// A value near each column's mean over a tile that has not been shifted; for a column that is
+/// constant there, its value to the last bit, so that what is left of it is 0. The last column, of
+/// ones, is left out.
+fn centre_of<A: Scalar>(tile: &[A], width: usize, roots: &Array1<A>) -> Vec<A> {
+    let mut rows = tile
+        .chunks_exact(width)
+        .zip(roots)
+        .filter(|(_, root)| **root > A::zero());
+    let mut sums = vec![A::zero(); width - 1];
+    let Some((first, &first_root)) = rows.next() else {
+        return sums;
+    };
+    let mut count = A::one();
+    for (row, &root) in rows {
+        count += A::one();
+        for ((sum, &value), &first) in sums.iter_mut().zip(row).zip(first) {
+            *sum += value / root - first / first_root;
+        }
+    }
+    sums.iter()
+        .zip(first)
+        .map(|(&sum, &first)| first / first_root + sum / count)
+        .collect()
+}
