@@ -6,7 +6,7 @@ use criterion::{BenchmarkId, Criterion, Throughput};
 use elm_benches::topics::{ALL, Topic};
 
 /// Every series of `topic`, with throughput in rows.
-pub fn topic(criterion: &mut Criterion, topic: Topic) {
+pub(crate) fn topic(criterion: &mut Criterion, topic: Topic) {
     for series in ALL.iter().filter(|series| series.topic == topic) {
         let name = format!("{}, by {}", topic.name(), series.varied.name());
         let mut group = criterion.benchmark_group(name);

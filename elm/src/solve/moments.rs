@@ -271,7 +271,7 @@ impl<A: Scalar> Moments<A> {
         let constant = if self.frame.intercept {
             let hidden = &self.frame.hidden_mean / self.frame.hidden_scale
                 - ArrayView1::from(&self.shift[..neurons]);
-            scaled - &ArrayView1::from(&self.shift[neurons..]) - hidden.dot(beta)
+            scaled - ArrayView1::from(&self.shift[neurons..]) - hidden.dot(beta)
         } else {
             Array1::zeros(outputs)
         };
