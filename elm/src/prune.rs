@@ -50,7 +50,9 @@
 //! # What the leave-one-out error of a pruned network is worth
 //! The rows that judge a network have here chosen its neurons, so that its leave-one-out error
 //! ([`Pruned::path`], and that in the diagnosis) is too good: the more so, the more candidates there
-//! are per row and the noisier the targets. As a bound on the loss it holds for the rows at hand.
+//! are per row and the noisier the targets. As a bound on the loss it holds for the rows at hand: on
+//! Friedman 1, 1000 rows with noise of deviation 1, 400 candidates and a stated loss of 5 %, the error
+//! against the function itself rose from 0.74 to 1.11 (example `prune`), which with the noise is 20 %.
 //! Judge the result on rows that were held back.
 
 use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis, concatenate, s};

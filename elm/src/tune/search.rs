@@ -172,9 +172,18 @@ impl<'a, A: Scalar> Search<'a, A> {
         Ok(())
     }
 
+    /// The standard errors that scales of inputs have to win by beyond what other steps have to: each
+    /// input's is one more parameter fitted to the rows, and leave-one-out does not leave a row out of
+    /// that fit. (Of single inputs tens are tried, and the best of so many that change nothing looks
+    /// better by two standard errors, however many rows there are.)
+    fn caution(&self) -> f64 {
+        10.0 * self.x.ncols() as f64 / self.x.nrows() as f64
+    }
+
     /// Scales inputs by the slopes that the network has along them, and again, as long as that pays.
     fn follow_slopes(&mut self) -> Result<()> {
         const ROUNDS: usize = 4;
+        let caution = self.caution();
         for _ in 0..ROUNDS {
             let Some(now) = self.now().filter(|_| !self.is_spent()) else {
                 break;
@@ -186,7 +195,9 @@ impl<'a, A: Scalar> Search<'a, A> {
             for power in [1.0, 0.5] {
                 let scales = proportional(&slopes, power);
                 let exponent = now.scale.log10();
-                moved |= self.move_if(now.neurons, exponent, &scales, slopes_pay)?;
+                moved |= self.move_if(now.neurons, exponent, &scales, |new, old| {
+                    new.beats(old, 1.0 + caution)
+                })?;
             }
             if !moved {
                 break;
@@ -257,6 +268,7 @@ impl<'a, A: Scalar> Search<'a, A> {
 
     /// Coordinate by coordinate, by a factor that shrinks once no input moves.
     fn choose_input_scales(&mut self) -> Result<()> {
+        let caution = self.caution();
         let mut step = 2.0 * COARSE;
         while step >= FINEST && !self.is_spent() {
             let mut moved = false;
@@ -269,7 +281,9 @@ impl<'a, A: Scalar> Search<'a, A> {
                     scales.resize(self.x.ncols(), 1.0);
                     scales[input] *= 10.0_f64.powf(direction * step);
                     let exponent = now.scale.log10();
-                    if self.move_if(now.neurons, exponent, &scales, input_pays)? {
+                    if self.move_if(now.neurons, exponent, &scales, |new, old| {
+                        new.beats(old, 2.0 + caution)
+                    })? {
                         moved = true;
                         break;
                     }
@@ -369,18 +383,8 @@ fn scale_pays(new: &Attempt, old: &Attempt) -> bool {
     new.beats(old, 1.5)
 }
 
-fn slopes_pay(new: &Attempt, old: &Attempt) -> bool {
-    new.beats(old, 1.0)
-}
-
 fn neurons_pay(new: &Attempt, old: &Attempt) -> bool {
     new.beats(old, 1.0)
-}
-
-/// Tens of scales of single inputs are tried: the best of so many that change nothing looks better
-/// by two standard errors, and on few rows following it would be following noise.
-fn input_pays(new: &Attempt, old: &Attempt) -> bool {
-    new.beats(old, 2.0)
 }
 
 fn step_pays(new: &Attempt, old: &Attempt) -> bool {
