@@ -1,7 +1,7 @@
 //! A page to look at: a sphere, the lobes, the error and the size of every material, and a sphere
 //! whose shading is the [exported](crate::export) network running in the browser.
 //!
-//! [`write`] makes one HTML file with the networks inside and one picture per material beside it.
+//! [`write()`] makes one HTML file with the networks inside and one picture per material beside it.
 //! Nothing is loaded from anywhere else, so the folder can be opened from a disk.
 
 mod lobes;

@@ -5,7 +5,7 @@ use ndarray::{Array1, Array2, ArrayView2, Axis};
 use crate::scalar::Scalar;
 use crate::solve::Ridge;
 
-/// Predictions for rows by fits that have not seen them; made by [`Validator`] and by
+/// Predictions for rows by fits that have not seen them; made by [`Validator`](super::Validator) and by
 /// [`CheckedParams::cross_validate`](crate::CheckedParams::cross_validate).
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldOut<A: Scalar> {
@@ -40,7 +40,7 @@ impl<A: Scalar> HeldOut<A> {
     }
 }
 
-/// Held-out errors along a path of strengths; made by [`Validator`].
+/// Held-out errors along a path of strengths; made by [`Validator`](super::Validator).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
     pub(super) lambdas: Vec<f64>,
