@@ -23,7 +23,7 @@
 //! };
 //! let folds = protocol::Folds::new(data.directions.len(), 10, 1)?;
 //! let scores = protocol::cross_validate(&paper, &data, &folds, |_, _| {})?;
-//! let red = scores[0].channels[0];
+//! let red = &scores[0].channels[0];
 //! assert!(red.held_out.rmse > red.train.rmse);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -66,18 +66,19 @@ impl Default for PriorParams {
 /// ```
 /// use elm_brdf::{brdf::Fit, geometry::pairs, prior::PriorParams};
 /// use elm_datasets::{Invalid, MaterialId, synthetic};
-/// use ndarray::{Axis, concatenate};
+/// use ndarray::{Array2, Axis};
 ///
 /// let ids: Vec<MaterialId> = MaterialId::all().take(12).collect();
 /// let data = synthetic::measurements(1, &ids, Invalid::Clamp);
 /// let pairs = pairs(&data.directions);
-/// // The first channel of all materials but the first.
-/// let others: Vec<_> = data.materials[1..].iter().map(|m| m.values.slice(s![.., ..1])).collect();
-/// let prior = PriorParams::default().build(&pairs, concatenate(Axis(1), &others)?.view())?;
-/// // Twenty measurements of the first.
-/// let few = data.materials[0].values.slice(s![..200;10, ..1]);
-/// let at: Vec<_> = pairs.iter().step_by(10).copied().take(20).collect();
-/// let model = prior.fit(&at, few)?;
+/// // The first channel of every material, the first of which is the new one.
+/// let values = Array2::from_shape_fn((205, 12), |(row, m)| data.materials[m].values[[row, 0]]);
+/// let prior = PriorParams::default().build(&pairs, values.view())?.without(&[0])?;
+/// // Twenty measurements of it.
+/// let rows: Vec<usize> = (0..200).step_by(10).collect();
+/// let at: Vec<_> = rows.iter().map(|&row| pairs[row]).collect();
+/// let few = values.select(Axis(0), &rows).select(Axis(1), &[0]);
+/// let model = prior.fit(&at, few.view())?;
 /// assert_eq!(model.eval(&pairs)?.dim(), (205, 1));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
