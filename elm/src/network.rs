@@ -9,7 +9,7 @@ use crate::predictor::Predictor;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
 use crate::solve::spectrum::norm;
-use crate::solve::{Diagnosis, Reason, Solution, check_length, check_matrix};
+use crate::solve::{Diagnosis, Reason, Solution, check_length, check_matrix, check_room};
 
 /// Project, activate, and append the inputs where they are linked directly.
 pub(crate) fn design<A: Scalar>(
@@ -29,6 +29,18 @@ pub(crate) fn design<A: Scalar>(
 
 /// A fitted network: $o(x) = \sum_k \beta_k f(\omega_k \cdot x + b_k)$ (equation 7) plus, where
 /// set, an intercept and direct links. Made by [`ElmParams::fit`](crate::ElmParams::fit).
+///
+/// ```
+/// use elm::ElmParams;
+/// use ndarray::array;
+///
+/// let (x, t) = (array![[0.0], [1.0], [2.0], [3.0]], array![0.0, 1.0, 4.0, 9.0]);
+/// let model = ElmParams::new(10).fit(&x, &t)?;
+/// // A prediction is the hidden-layer matrix times the output weights, plus the intercept.
+/// let by_hand = model.hidden_matrix(&x)?.dot(&model.beta()) + &model.intercept();
+/// assert!((model.predict(&x)? - by_hand).iter().all(|d: &f64| d.abs() < 1e-9));
+/// # Ok::<(), elm::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "", try_from = "Parts<A>")]
 pub struct Elm<A: Scalar> {
@@ -59,11 +71,10 @@ pub(crate) fn check_layer<A: Scalar>(
     scaler: Option<&Scaler<A>>,
 ) -> Result<()> {
     hidden.check()?;
-    for vector in scaler.iter().flat_map(|s| [s.mean(), s.factor()]) {
-        check_length("inputs of the scaler", vector.len(), hidden.inputs())?;
-        check_matrix("the scaler", vector.insert_axis(Axis(0)))?;
+    match scaler {
+        Some(scaler) => check_length("inputs of the scaler", scaler.mean().len(), hidden.inputs()),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 impl<A: Scalar> Elm<A> {
@@ -119,7 +130,7 @@ impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
             direct_links,
             beta,
             intercept,
-            diagnosis,
+            mut diagnosis,
         } = parts;
         check_layer(&hidden, scaler.as_ref())?;
         let (inputs, neurons) = hidden.weights().dim();
@@ -128,6 +139,7 @@ impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
         check_length("rows of output weights", beta.nrows(), columns)?;
         check_length("intercepts", intercept.len(), beta.ncols())?;
         check_matrix("intercepts", intercept.view().insert_axis(Axis(0)))?;
+        diagnosis.check(beta.ncols())?;
         Ok(Self {
             scaler,
             hidden,
@@ -248,10 +260,11 @@ impl<A: Scalar> Elm<A> {
     /// Times [`beta`](Self::beta) plus [`intercept`](Self::intercept) it is the prediction.
     ///
     /// # Errors
-    /// [`Error::Shape`], [`Error::Empty`] and [`Error::NotFinite`] for `x`.
+    /// [`Error::Shape`], [`Error::Empty`] and [`Error::NotFinite`] for `x`; [`Error::TooLarge`].
     pub fn hidden_matrix(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
         check_length("inputs", x.ncols(), self.inputs())?;
         check_matrix("inputs", x.view())?;
+        check_room("the hidden-layer matrix", x.nrows(), self.beta.nrows())?;
         let scaled = self
             .scaler
             .as_ref()
