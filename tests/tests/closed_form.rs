@@ -7,10 +7,12 @@
 use std::path::PathBuf;
 
 use elm::solve::{PseudoInverse, Ridge, Solver};
-use elm::{ElmParams, Scaler};
+use elm::{Activation, ElmParams, Scaler};
 use elm_brdf::features::Features;
 use elm_brdf::geometry::pairs;
-use elm_brdf::protocol::Folds;
+use elm_brdf::link::Link;
+use elm_brdf::model::{BrdfParams, ScaledOnce};
+use elm_brdf::protocol::{Folds, cross_validate};
 use elm_datasets::{Invalid, MaterialId, Measurements, curet, synthetic};
 use ndarray::{Array2, ArrayView2, Axis, concatenate};
 
@@ -84,6 +86,37 @@ fn one_factorisation_is_refitting(data: &Measurements) {
                 "{solver}, fold {}: {error:e} > {limit:e}",
                 fit.label()
             );
+        }
+    }
+}
+
+#[test]
+fn where_nothing_is_scaled_scaling_once_is_scaling_in_each_fold() {
+    let data = synthetic::measurements(1, &all()[..5], Invalid::Clamp);
+    let folds = Folds::new(data.directions.len(), 10, 1).unwrap();
+    let params = BrdfParams {
+        features: Features::Paper,
+        link: Link::Identity,
+        // Well conditioned, so that the two routes have the same digits.
+        network: ElmParams::new(30)
+            .activation(Activation::Sine)
+            .scale(3.0)
+            .solver(PseudoInverse::default())
+            .standardise(false)
+            .intercept(false),
+    };
+    let each = cross_validate(&params, &data, &folds, |_, _| {}).unwrap();
+    let once = ScaledOnce::new(params).unwrap();
+    let mut calls = Vec::new();
+    let once = cross_validate(&once, &data, &folds, |done, all| calls.push((done, all))).unwrap();
+    assert_eq!(calls, [(10, 10)]);
+    for (a, b) in each.iter().zip(&once) {
+        let limit = 1e-9 * largest(a.predicted.view());
+        assert!(largest((&a.predicted - &b.predicted).view()) <= limit);
+        for (a, b) in a.channels.iter().zip(&b.channels) {
+            for (a, b) in [(&a.train, &b.train), (&a.held_out, &b.held_out)] {
+                assert!((a.rmse - b.rmse).abs() <= limit);
+            }
         }
     }
 }

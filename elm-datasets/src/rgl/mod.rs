@@ -81,18 +81,19 @@ pub enum Problem {
     /// A field of a type that is not known.
     #[error("field {field:?}: expected a type from 1 to 11, found {found}")]
     FieldType {
-        /// Name of the field.
+        /// Name of the field, shortened if long.
         field: String,
         /// Code of the type.
         found: u8,
     },
     /// A field whose numbers are not within the file.
     #[error(
-        "field {field:?}: expected shape {shape:?} from byte {offset} to lie within the file's \
-         {file} bytes"
+        "field {field:?}: expected shape {} from byte {offset} to lie within the file's {file} \
+         bytes",
+        brief(shape)
     )]
     FieldData {
-        /// Name of the field.
+        /// Name of the field, shortened if long.
         field: String,
         /// Where its numbers begin.
         offset: u64,
@@ -108,7 +109,10 @@ pub enum Problem {
         field: &'static str,
     },
     /// A field of another type or shape.
-    #[error("field {field:?}: expected {expected}, found type {code} of shape {shape:?}")]
+    #[error(
+        "field {field:?}: expected {expected}, found type {code} of shape {}",
+        brief(shape)
+    )]
     Layout {
         /// Name of the field.
         field: &'static str,
@@ -146,6 +150,15 @@ pub enum Problem {
         /// How many azimuths there are.
         azimuths: usize,
     },
+}
+
+/// A shape for an error: a file may claim any number of dimensions.
+fn brief(shape: &[u64]) -> String {
+    const MOST: usize = 6;
+    if shape.len() <= MOST {
+        return format!("{shape:?}");
+    }
+    format!("{:?}... ({} dimensions)", &shape[..MOST], shape.len())
 }
 
 /// The channels of a file.
