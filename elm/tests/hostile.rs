@@ -254,7 +254,7 @@ fn strengths_at_the_ends_of_the_range_are_solved_or_refused() {
             .fit(&x, &t);
         assert!(matches!(refused, Err(Error::Parameter { .. })), "{lambda}");
     }
-    let hidden = array![[1.0, 2.0], [0.5, 1.0], [3.0, -1.0]];
+    let hidden: Array2<f64> = array![[1.0, 2.0], [0.5, 1.0], [3.0, -1.0]];
     let targets = array![[1.0], [2.0], [3.0]];
     let problem = solve::LeastSquares::new(&hidden, &targets).unwrap();
     let validator = Validator::new(&problem).unwrap();
@@ -271,7 +271,7 @@ fn strengths_at_the_ends_of_the_range_are_solved_or_refused() {
         validator.k_fold_path(&[0, 1, 2], &[]),
         Err(Error::Empty { .. })
     ));
-    for lambda in [1e-300, 1e300, f64::MAX] {
+    for lambda in [1e-300_f64, 1e300, f64::MAX] {
         let held_out = validator.leave_one_out(&[lambda]);
         assert!(
             held_out.is_ok_and(|h| h.predictions().iter().all(|p| p.is_finite())),
