@@ -2,7 +2,7 @@
 
 use elm::persist::{self, Persist};
 use elm::solve::{PseudoInverse, Ridge};
-use elm::{Accumulator, Activation, Biases, Elm, ElmParams, Scalar};
+use elm::{Accumulator, Activation, Biases, Elm, ElmParams, Neurons, Scalar};
 use ndarray::{Array1, Array2};
 
 use super::{Reader, Seed, read};
@@ -141,6 +141,9 @@ fn models() -> Vec<Seed> {
         .direct_links(true)
         .standardise(false)
         .intercept(false);
+    let mixed = ElmParams::<f64>::new(1)
+        .and(Neurons::new(1, Activation::Sine))
+        .and(Neurons::radial(2));
     let single = fit(&ElmParams::<f32>::new(2).solver(Ridge::relative(1e-3)));
     let mut broken = persist::to_bytes(&plain).expect("a built-in activation");
     broken.truncate(broken.len() / 2);
@@ -148,6 +151,8 @@ fn models() -> Vec<Seed> {
         seed("plain.json", true, &plain),
         seed("plain.elm", false, &plain),
         seed("linked.elm", false, &fit(&linked)),
+        seed("mixed.elm", false, &fit(&mixed)),
+        seed("mixed.json", true, &fit(&mixed)),
         seed("single.json", true, &single),
         seed("single.elm", false, &single),
         Seed {
