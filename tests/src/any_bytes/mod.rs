@@ -6,6 +6,9 @@
 //! is checked. The fuzz targets in `fuzz/` run them on whatever libFuzzer thinks of, the property
 //! tests in `tests/any_bytes.rs` on a bounded number of random bytes and mutated seeds.
 
+// What is expected here is what is tested.
+#![allow(clippy::expect_used)]
+
 mod networks;
 mod reflectance;
 mod tables;
