@@ -1,6 +1,6 @@
 //! What every reflectance model here can do, and what can make one from measurements.
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView2, Axis};
 
 use crate::error::{Error, Result};
 use crate::geometry::Pair;
@@ -45,6 +45,34 @@ pub trait Fit {
     /// # Errors
     /// Where these measurements cannot be fitted.
     fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>>;
+
+    /// What the fit without each fold predicts at **all** pairs, those of the fold and those that
+    /// it was fitted to: one array of shape (pairs, channels) per fold. `folds` has the fold of
+    /// each pair, below `count`; `done` is told after each fold how many there have been.
+    ///
+    /// Refits fold by fold, unless a method knows a shorter way.
+    ///
+    /// # Errors
+    /// Those of [`fit`](Self::fit) and of [`Brdf::eval`].
+    fn cross_fits(
+        &self,
+        pairs: &[Pair],
+        values: ArrayView2<'_, f64>,
+        folds: &[usize],
+        count: usize,
+        done: &mut dyn FnMut(usize),
+    ) -> Result<Vec<Array2<f64>>> {
+        let without = |fold: usize| {
+            let other = |row: &usize| folds.get(*row) != Some(&fold);
+            let left: Vec<usize> = (0..pairs.len()).filter(other).collect();
+            let left_pairs: Vec<Pair> = left.iter().map(|&row| pairs[row]).collect();
+            let model = self.fit(&left_pairs, values.select(Axis(0), &left).view())?;
+            let predicted = model.eval(pairs)?;
+            done(fold + 1);
+            Ok(predicted)
+        };
+        (0..count).map(without).collect()
+    }
 }
 
 /// What every method asks of measurements: at least one, one row of values per pair of

@@ -103,7 +103,7 @@ pub struct MaterialScores {
 ///
 /// Materials measured at the same directions are fitted together, fold by fold: an extreme
 /// learning machine then factorises one hidden-layer matrix per fold, however many materials
-/// there are.
+/// there are; with its inputs [scaled once](crate::model::ScaledOnce), one for all folds.
 ///
 /// # Errors
 /// Those of the method; [`Error::Folds`] when `folds` was made for another number of
@@ -289,16 +289,22 @@ impl<'a> Group<'a> {
         let mut train = Training::default();
         let mut held_out = Array2::zeros(self.values.dim());
         let mut fold_metrics: Vec<Vec<Metrics>> = vec![Vec::new(); columns];
-        for fold in 0..folds.count {
+        let labels: Vec<usize> = self.rows.iter().map(|&row| folds.of_row(row)).collect();
+        let (pairs, values) = (&self.pairs, self.values.view());
+        let fits = method.cross_fits(pairs, values, &labels, folds.count, &mut done)?;
+        for (fold, fitted) in fits.into_iter().enumerate() {
             let (test_rows, train_rows): (Vec<usize>, Vec<usize>) =
-                (0..self.rows.len()).partition(|&r| folds.of_row(self.rows[r]) == fold);
+                (0..self.rows.len()).partition(|&row| labels[row] == fold);
             let (train_pairs, train_values) = self.select(&train_rows);
-            let model = method.fit(&train_pairs, train_values.view())?;
-            train.push(&train_pairs, model.eval(&train_pairs)?, train_values);
+            train.push(
+                &train_pairs,
+                fitted.select(Axis(0), &train_rows),
+                train_values,
+            );
             // Where invalid values are dropped a fold may hold none of a material's rows.
             if !test_rows.is_empty() {
                 let (test_pairs, truth) = self.select(&test_rows);
-                let predicted = model.eval(&test_pairs)?;
+                let predicted = fitted.select(Axis(0), &test_rows);
                 for (column, metrics) in fold_metrics.iter_mut().enumerate() {
                     let (predicted, truth) = (one(&predicted, column), one(&truth, column));
                     metrics.push(Metrics::of(&test_pairs, predicted, truth)?);
@@ -307,7 +313,6 @@ impl<'a> Group<'a> {
                     held_out.row_mut(row).assign(&predicted);
                 }
             }
-            done(fold + 1);
         }
         let exchanged = quality::exchanged(&self.pairs);
         let scores = (0..columns).map(|column| {

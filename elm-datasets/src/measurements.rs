@@ -102,6 +102,16 @@ impl fmt::Display for Origin {
 }
 
 /// Reflectance of several materials, all measured at the same pairs of directions.
+///
+/// ```
+/// use elm_datasets::{Invalid, synthetic};
+///
+/// let set = synthetic::measurements(1, &[synthetic::find("matte 01")?], Invalid::Clamp);
+/// assert_eq!(set.directions.len(), 205);
+/// let samples = set.samples(0).ok_or("no such material")?;
+/// assert_eq!(samples.values.dim(), (205, set.channels.len()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurements {
     /// Where the numbers come from.

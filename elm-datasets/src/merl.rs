@@ -97,28 +97,66 @@ impl Merl {
             path: path.to_owned(),
             reason,
         };
-        let refused = |problem| Error::Merl {
-            path: path.to_owned(),
-            problem,
-        };
         let file = File::open(path).map_err(failed)?;
         let found = file.metadata().map_err(failed)?.len();
-        let mut stream = BufReader::with_capacity(1 << 16, file);
-        if found >= HEADER {
-            let found = dimensions(&mut stream).map_err(failed)?;
+        let stream = BufReader::with_capacity(1 << 16, file);
+        Self::parse(stream, Some(found), path)
+    }
+
+    /// As [`read`](Self::read), from a stream, whose length shows only as it is read. `name` takes
+    /// the place of the file in errors.
+    ///
+    /// # Errors
+    /// As for [`read`](Self::read).
+    pub fn from_reader(stream: impl Read, name: impl AsRef<Path>) -> Result<Self, Error> {
+        Self::parse(stream, None, name.as_ref())
+    }
+
+    fn parse(mut stream: impl Read, length: Option<u64>, path: &Path) -> Result<Self, Error> {
+        let failed = |reason| Error::Read {
+            path: path.to_owned(),
+            reason,
+        };
+        let refused = |problem| {
+            Err(Error::Merl {
+                path: path.to_owned(),
+                problem,
+            })
+        };
+        let mut header = Vec::new();
+        let start = stream.by_ref().take(HEADER).read_to_end(&mut header);
+        start.map_err(failed)?;
+        if header.len() as u64 == HEADER {
+            let found = dimensions(&mut &*header).map_err(failed)?;
             if found != DIMENSIONS {
-                return Err(refused(Problem::Dimensions { found }));
+                return refused(Problem::Dimensions { found });
             }
         }
-        if found != LENGTH {
-            return Err(refused(Problem::Length { found }));
+        match length {
+            Some(found) if found != LENGTH => return refused(Problem::Length { found }),
+            _ => {}
         }
-        let mut numbers = Vec::with_capacity(3 * CELLS);
-        let mut block = [0; 8 * PHI_D];
+        let mut numbers = Vec::new();
+        if length.is_some() {
+            numbers.reserve_exact(3 * CELLS);
+        }
+        let mut block = Vec::with_capacity(8 * PHI_D);
         while numbers.len() < 3 * CELLS {
-            stream.read_exact(&mut block).map_err(failed)?;
+            block.clear();
+            let mut row = stream.by_ref().take(8 * PHI_D as u64);
+            row.read_to_end(&mut block).map_err(failed)?;
             let words = block.as_chunks::<8>().0.iter();
             numbers.extend(words.map(|&bytes| f64::from_le_bytes(bytes)));
+            if block.len() < 8 * PHI_D {
+                let found = (header.len() + 8 * numbers.len() + block.len() % 8) as u64;
+                return refused(Problem::Length { found });
+            }
+        }
+        let more = io::copy(&mut stream.take(1), &mut io::sink()).map_err(failed)?;
+        if more > 0 {
+            return refused(Problem::Length {
+                found: LENGTH + more,
+            });
         }
         Ok(Self { numbers })
     }

@@ -10,6 +10,7 @@
 //!   1/sr, without the cosine, at each wavelength.
 
 use std::f64::consts::FRAC_PI_2;
+use std::io::Read;
 use std::path::Path;
 
 use ndarray::Array2;
@@ -71,6 +72,22 @@ pub enum Problem {
 pub fn read(path: impl AsRef<Path>) -> Result<Samples, Error> {
     let path = path.as_ref();
     parse(path, &file::read(path)?)
+}
+
+/// As [`read`], from a stream. `name` takes the place of the file in errors.
+///
+/// # Errors
+/// As for [`read`].
+pub fn from_reader(mut stream: impl Read, name: impl AsRef<Path>) -> Result<Samples, Error> {
+    let path = name.as_ref();
+    let mut bytes = Vec::new();
+    match stream.read_to_end(&mut bytes) {
+        Ok(_) => parse(path, &bytes),
+        Err(reason) => Err(Error::Read {
+            path: path.to_owned(),
+            reason,
+        }),
+    }
 }
 
 fn parse(path: &Path, bytes: &[u8]) -> Result<Samples, Error> {

@@ -7,6 +7,15 @@ use serde::{Deserialize, Serialize};
 ///
 /// `theta` is measured from the surface normal, `phi` around it. `omega_i` points from the surface
 /// towards the light, `omega_o` from the surface towards the viewer.
+///
+/// ```
+/// use elm_datasets::Directions;
+/// use std::f64::consts::PI;
+///
+/// let mirror = Directions { theta_i: 0.5, phi_i: 0.0, theta_o: 0.5, phi_o: PI };
+/// assert!((mirror.cos_between() - 1.0_f64.cos()).abs() < 1e-15);
+/// assert_eq!(mirror.swapped().phi_i, PI);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Directions {
     /// Angle between the normal and the light.
@@ -42,6 +51,16 @@ impl Directions {
 }
 
 /// Reflectance of one material at scattered pairs of directions.
+///
+/// ```
+/// use elm_datasets::scattered::{self, Options};
+///
+/// let text = "theta_i,phi_i,theta_o,phi_o,r,g\n0.1,0.2,0.3,0.4,1,2\n0.5,-3,1.2,4,3,4\n";
+/// let samples = scattered::from_reader(text.as_bytes(), "paint.csv", &Options::default())?;
+/// assert_eq!(samples.channels, ["r", "g"]);
+/// assert_eq!(samples.values.row(1).to_vec(), [3.0, 4.0]);
+/// # Ok::<(), elm_datasets::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Samples {
     /// One pair of directions per row of [`values`](Self::values).

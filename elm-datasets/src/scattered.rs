@@ -11,7 +11,7 @@
 //! ```
 
 use std::f64::consts::FRAC_PI_2;
-use std::io::Read;
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 use ndarray::{Array2, Axis};
@@ -336,29 +336,53 @@ fn from_vectors([ix, iy, iz, ox, oy, oz]: [f64; 6]) -> Result<Directions, Proble
 /// - [`Error::Write`] if the file system refuses.
 pub fn write(path: impl AsRef<Path>, samples: &Samples) -> Result<(), Error> {
     let path = path.as_ref();
-    check(samples).map_err(|(line, problem)| Error::Scattered {
+    check(path, samples)?;
+    file::replace(path, |out| write_checked(out, samples))
+}
+
+/// As [`write()`], to a stream. `name` takes the place of the file in errors.
+///
+/// # Errors
+/// As for [`write()`].
+pub fn to_writer(
+    mut stream: impl Write,
+    name: impl AsRef<Path>,
+    samples: &Samples,
+) -> Result<(), Error> {
+    let path = name.as_ref();
+    check(path, samples)?;
+    write_checked(&mut stream, samples).map_err(|reason| Error::Write {
         path: path.to_owned(),
-        line,
-        problem,
-    })?;
-    file::replace(path, |out| {
-        let mut writer = ::csv::Writer::from_writer(out);
-        let channels = samples.channels.iter().map(String::as_str);
-        writer.write_record(ANGLES.into_iter().chain(channels))?;
-        for (pair, values) in samples.directions.iter().zip(samples.values.rows()) {
-            let numbers = angles(pair).into_iter().chain(values.iter().copied());
-            writer.write_record(numbers.map(|number| format!("{number:?}")))?;
-        }
-        writer.flush()
+        reason,
     })
+}
+
+fn write_checked(out: &mut dyn Write, samples: &Samples) -> io::Result<()> {
+    let mut writer = ::csv::Writer::from_writer(out);
+    let channels = samples.channels.iter().map(String::as_str);
+    writer.write_record(ANGLES.into_iter().chain(channels))?;
+    for (pair, values) in samples.directions.iter().zip(samples.values.rows()) {
+        let numbers = angles(pair).into_iter().chain(values.iter().copied());
+        writer.write_record(numbers.map(|number| format!("{number:?}")))?;
+    }
+    writer.flush()
 }
 
 fn angles(pair: &Directions) -> [f64; 4] {
     [pair.theta_i, pair.phi_i, pair.theta_o, pair.phi_o]
 }
 
+/// Refuses what `read` would refuse.
+fn check(path: &Path, samples: &Samples) -> Result<(), Error> {
+    check_samples(samples).map_err(|(line, problem)| Error::Scattered {
+        path: path.to_owned(),
+        line,
+        problem,
+    })
+}
+
 /// What `read` would refuse, with its line.
-fn check(samples: &Samples) -> Result<(), (usize, Problem)> {
+fn check_samples(samples: &Samples) -> Result<(), (usize, Problem)> {
     let Samples {
         directions,
         values,

@@ -27,6 +27,16 @@ use crate::Error;
 pub const MAX_ROWS: usize = 10_000_000;
 
 /// Inputs with targets, with and without noise.
+///
+/// ```
+/// use elm_datasets::toy;
+///
+/// let toy = toy::friedman1(200, 1.0, 7)?;
+/// assert_eq!((toy.inputs.dim(), toy.targets.dim()), ((200, 10), (200, 1)));
+/// let noise = &toy.targets - &toy.noiseless;
+/// assert!((0.8..1.2).contains(&noise.std(0.0)));
+/// # Ok::<(), elm_datasets::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Toy {
     /// Shape (rows, inputs), evenly distributed over the problem's domain.

@@ -13,7 +13,6 @@ use std::path::Path;
 use bsdf::{Field, Ggx, bytes, file, floats, tabulate};
 use elm_datasets::rgl::{Channels, Problem, Rgl};
 use elm_datasets::{Directions, Error, Sampling, scattered};
-use proptest::prelude::*;
 
 const ELEVATIONS: [f64; 2] = [0.25, 1.0];
 
@@ -319,21 +318,5 @@ fn headers_that_are_none_are_reported_with_their_byte() {
     assert_eq!(problem(&name), Problem::FieldName { at: 18 });
     for end in 0..whole.len() {
         assert!(Rgl::from_bytes(&whole[..end]).is_err(), "{end}");
-    }
-}
-
-proptest! {
-    #[test]
-    fn mutations_are_no_reason_to_panic(changes in support::changes(), spectral in any::<bool>()) {
-        let name = if spectral { "spectra" } else { "rgb" };
-        let bytes = support::mutate(file(&on_paper(name, 1)), changes);
-        match Rgl::from_bytes(&bytes) {
-            Ok(rgl) => {
-                for pair in random(20) {
-                    prop_assert_eq!(rgl.eval(&pair).len(), rgl.channels().count());
-                }
-            }
-            Err(problem) => prop_assert!(!problem.to_string().contains('\n')),
-        }
     }
 }

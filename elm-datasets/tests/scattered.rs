@@ -217,37 +217,7 @@ fn a_place_is_a_value_to_match_on() {
     ));
 }
 
-fn sound(result: Result<Samples, Error>) {
-    match result {
-        Ok(samples) => {
-            let (rows, columns) = samples.values.dim();
-            assert_eq!(samples.directions.len(), rows);
-            assert_eq!(samples.channels.len(), columns);
-            for pair in &samples.directions {
-                assert!((0.0..=FRAC_PI_2).contains(&pair.theta_i));
-                assert!((0.0..=FRAC_PI_2).contains(&pair.theta_o));
-            }
-        }
-        Err(error) => assert!(!error.to_string().contains('\n'), "{error}"),
-    }
-}
-
 proptest! {
-    #[test]
-    fn mutations_are_no_reason_to_panic(
-        changes in support::changes(),
-        vectors in any::<bool>(),
-        options in prop::sample::select(vec![RADIANS, DEGREES, WEIGHTED]),
-    ) {
-        let text: &[u8] = if vectors {
-            b"wi_x,wi_y,wi_z,wo_x,wo_y,wo_z,r,g\n0,0,1,0.6,0,0.8,1,2\n0.8,0,0.6,0,0,1,3,4\n"
-        } else {
-            b"theta_i,phi_i,theta_o,phi_o,r,g\n0.1,0.2,0.3,0.4,1,2\r\n0.5,-3,1.2,4,3,4e-2\r\n"
-        };
-        let bytes = support::mutate(text.to_vec(), changes);
-        sound(scattered::from_reader(&*bytes, "some.csv", &options));
-    }
-
     #[test]
     fn what_is_written_is_read_back_bit_for_bit(
         rows in prop::collection::vec(

@@ -35,6 +35,7 @@
 //! Eliminating the column of ones first centres the rest, so that $R$ without its first row is the
 //! triangle of the centred problem, and the intercept is as unpenalised as in a batch fit.
 
+mod chunks;
 mod parts;
 mod spectrum;
 
@@ -57,6 +58,24 @@ use crate::solve::{Solver, check_length, check_matrix, check_room, check_weights
 /// of the parameters, except that leave-one-out, the default, needs the rows: an accumulator
 /// chooses by generalised cross-validation in its place, so that
 /// [`Diagnosis::leave_one_out`](crate::solve::Diagnosis::leave_one_out) is `None`.
+///
+/// ```
+/// use elm::{Accumulator, ElmParams};
+/// use ndarray::{Array2, Axis, array};
+///
+/// let params = ElmParams::new(20).check()?;
+/// // What rows look like: two inputs between -1 and 1.
+/// let sample = array![[-1.0, -1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, 1.0]];
+/// let mut accumulator = Accumulator::from_sample(&params, &sample, 1)?;
+/// for day in 0..30 {
+///     let x = Array2::from_shape_fn((8, 2), |(i, j)| ((day * 8 + i) as f64 * (1.3 + j as f64)).sin());
+///     accumulator.push(&x, &x.sum_axis(Axis(1)))?;
+/// }
+/// let model = accumulator.fit()?;
+/// let y = model.predict(&array![[0.25, 0.5]])?;
+/// assert!((y[[0, 0]] - 0.75_f64).abs() < 1e-3);
+/// # Ok::<(), elm::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "", try_from = "parts::Parts<A>")]
 pub struct Accumulator<A: Scalar> {
@@ -250,6 +269,10 @@ impl<A: Scalar> Accumulator<A> {
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<()> {
         let block = self.block();
+        // No doubling: a block is all that is ever pending.
+        let rows = (self.pending.len() / self.columns() + x.nrows()).min(block);
+        let room = (rows * self.columns()).saturating_sub(self.pending.len());
+        self.pending.reserve_exact(room);
         for start in (0..x.nrows()).step_by(block) {
             let range = s![start..x.nrows().min(start + block), ..];
             let x = x.slice(range);
@@ -259,11 +282,11 @@ impl<A: Scalar> Accumulator<A> {
             check_matrix("hidden-layer matrix", h.view())?;
             for (row, (h, t)) in h.rows().into_iter().zip(t.slice(range).rows()).enumerate() {
                 let weight = weights.map_or(A::one(), |weights| weights[start + row]);
-                self.rows += 1;
+                self.rows = self.rows.saturating_add(1);
                 if weight == A::zero() {
                     continue;
                 }
-                self.weighted_rows += 1;
+                self.weighted_rows = self.weighted_rows.saturating_add(1);
                 let root = weight.sqrt();
                 if self.intercept {
                     self.pending.push(root);
@@ -304,8 +327,8 @@ impl<A: Scalar> Accumulator<A> {
         next.flush()?;
         other.flush()?;
         next.absorb(&(&other.triangle * &other.scales))?;
-        next.rows += other.rows;
-        next.weighted_rows += other.weighted_rows;
+        next.rows = next.rows.saturating_add(other.rows);
+        next.weighted_rows = next.weighted_rows.saturating_add(other.weighted_rows);
         *self = next;
         Ok(())
     }
@@ -400,33 +423,3 @@ const BLOCK: usize = 4;
 const OVERFLOW: Error = Error::Overflow {
     what: "an accumulated value",
 };
-
-impl<A: Scalar> CheckedParams<A> {
-    /// Fits to chunks of rows that never stand in memory together: `chunks` yields inputs and
-    /// targets as [`fit`](Self::fit) takes them. Inputs are standardised by the **first** chunk,
-    /// which should be like the others. Leave-one-out is replaced; see [`Accumulator`].
-    ///
-    /// # Errors
-    /// The first error of `chunks`, [`Error::Empty`] when there are none, and those of
-    /// [`Accumulator::push`] and [`Accumulator::fit`].
-    pub fn fit_chunks<E: From<Error>>(
-        &self,
-        chunks: impl IntoIterator<Item = Result<(Array2<A>, Array2<A>), E>>,
-    ) -> Result<Elm<A>, E> {
-        let mut accumulator: Option<Accumulator<A>> = None;
-        for chunk in chunks {
-            let (x, t) = chunk?;
-            let accumulator = match &mut accumulator {
-                Some(accumulator) => accumulator,
-                none => none.insert(Accumulator::from_sample(self, &x, t.ncols())?),
-            };
-            accumulator.push(&x, &t)?;
-        }
-        let nothing = Error::Empty {
-            what: "chunks",
-            rows: 0,
-            columns: 0,
-        };
-        Ok(accumulator.ok_or(nothing)?.fit()?)
-    }
-}

@@ -44,7 +44,8 @@
 //! - `faer` (default): linear algebra in pure Rust.
 //! - `openblas-system`: LAPACK from the system's OpenBLAS, in place of faer. OpenBLAS is set to one
 //!   thread for the whole process: its parallel routines overflow the stack of a Rust thread.
-//! - `rayon`: prediction on several threads, `Predictor::predict_into_parallel`.
+//! - `rayon`: several threads where a call asks for them, `Predictor::predict_into_parallel` and
+//!   `CheckedParams::fit_chunks_parallel`.
 
 pub mod accumulate;
 pub mod activation;

@@ -1,6 +1,17 @@
 //! Measures of error between a prediction and the truth.
+//!
+//! ```
+//! use elm::metrics::{correlation, mae, rmse};
+//! use ndarray::array;
+//!
+//! let (predicted, truth) = (array![1.0, 2.0, 5.0], array![1.0, 3.0, 4.0]);
+//! assert_eq!(rmse(&predicted, &truth)?, (2.0_f64 / 3.0).sqrt());
+//! assert_eq!(mae(&predicted, &truth)?, 2.0 / 3.0);
+//! assert_eq!(correlation(&predicted, &array![7.0, 7.0, 7.0])?, None);
+//! # Ok::<(), elm::Error>(())
+//! ```
 
-use ndarray::{ArrayRef1, ArrayView1};
+use ndarray::{Array1, ArrayRef1, ArrayView1, ArrayView2, Axis};
 
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
@@ -8,7 +19,8 @@ use crate::scalar::Scalar;
 /// Root mean squared error.
 ///
 /// # Errors
-/// [`Error::Shape`] when the lengths differ, [`Error::Empty`] when there is nothing to compare.
+/// [`Error::Shape`] when the lengths differ, [`Error::Empty`] when there is nothing to compare,
+/// [`Error::NotFinite`] for a NaN or infinity.
 pub fn rmse<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<f64> {
     check(predicted, truth)?;
     let errors: Vec<f64> = pairs(predicted, truth).map(|(p, t)| p - t).collect();
@@ -18,30 +30,40 @@ pub fn rmse<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result
 /// Mean absolute error.
 ///
 /// # Errors
-/// [`Error::Shape`] when the lengths differ, [`Error::Empty`] when there is nothing to compare.
+/// [`Error::Shape`] when the lengths differ, [`Error::Empty`] when there is nothing to compare,
+/// [`Error::NotFinite`] for a NaN or infinity.
 pub fn mae<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<f64> {
     check(predicted, truth)?;
+    let n = truth.len() as f64;
+    // Divided before it is summed: the sum of many errors of 1e308 is out of range.
     Ok(pairs(predicted, truth)
-        .map(|(p, t)| (p - t).abs())
-        .sum::<f64>()
-        / truth.len() as f64)
+        .map(|(p, t)| (p - t).abs() / n)
+        .sum())
 }
 
 /// Pearson's correlation coefficient; `None` where it does not exist, that is, where one of the
 /// two is constant (to rounding).
 ///
 /// # Errors
-/// [`Error::Shape`] when the lengths differ, [`Error::Empty`] when there is nothing to compare.
+/// [`Error::Shape`] when the lengths differ, [`Error::Empty`] when there is nothing to compare,
+/// [`Error::NotFinite`] for a NaN or infinity.
 pub fn correlation<A: Scalar>(
     predicted: &ArrayRef1<A>,
     truth: &ArrayRef1<A>,
 ) -> Result<Option<f64>> {
     check(predicted, truth)?;
     let n = truth.len() as f64;
-    let mean = |x: &ArrayRef1<A>| x.iter().map(|v| v.as_f64()).sum::<f64>() / n;
-    let (mean_p, mean_t) = (mean(predicted), mean(truth));
+    // In units of the largest, as squares of 1e200 and of 1e-200 are out of range.
+    let scaled = |x: &ArrayRef1<A>| -> Vec<f64> {
+        let largest = x.iter().fold(0.0, |m: f64, v| m.max(v.as_f64().abs()));
+        let unit = if largest > 0.0 { largest } else { 1.0 };
+        x.iter().map(|v| v.as_f64() / unit).collect()
+    };
+    let (predicted, truth) = (scaled(predicted), scaled(truth));
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / n;
+    let (mean_p, mean_t) = (mean(&predicted), mean(&truth));
     let (mut pp, mut tt, mut pt) = (0.0, 0.0, 0.0);
-    for (p, t) in pairs(predicted, truth) {
+    for (p, t) in predicted.iter().zip(&truth) {
         let (p, t) = (p - mean_p, t - mean_t);
         pp += p * p;
         tt += t * t;
@@ -64,6 +86,13 @@ pub(crate) fn root_mean_square<A: Scalar>(
     scaled_root_mean_square(pairs.map(|(v, w)| (v.as_f64(), w.as_f64())))
 }
 
+/// Root of the mean of squares of each column.
+pub(crate) fn root_mean_squares<A: Scalar>(values: ArrayView2<'_, A>) -> Array1<f64> {
+    values.map_axis(Axis(0), |column| {
+        scaled_root_mean_square(column.iter().map(|value| (value.as_f64(), 1.0)))
+    })
+}
+
 /// Of values and weights. Scaled by the largest value, as squares of 1e200 are out of range.
 fn scaled_root_mean_square(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
     let largest = pairs.clone().fold(0.0, |m: f64, (value, _)| {
@@ -83,7 +112,7 @@ fn scaled_root_mean_square(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> f
     largest * (squares / total).sqrt()
 }
 
-fn check<A>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<()> {
+fn check<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<()> {
     if predicted.len() != truth.len() {
         return Err(Error::Shape {
             what: "predictions",
@@ -97,6 +126,12 @@ fn check<A>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<()> {
             rows: 0,
             columns: 1,
         });
+    }
+    for (what, values) in [("predictions", predicted), ("truth", truth)] {
+        if let Some(row) = values.iter().position(|value| !value.is_finite()) {
+            let column = 0;
+            return Err(Error::NotFinite { what, row, column });
+        }
     }
     Ok(())
 }
@@ -127,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn squares_out_of_range_do_no_harm_and_nan_is_not_hidden() {
+    fn squares_out_of_range_do_no_harm_and_nan_is_named() {
         let zero = Array1::zeros(4);
         for size in [1e-200, 1e200] {
             let p = array![3.0, -4.0, 0.0, 0.0] * size;
@@ -136,7 +171,12 @@ mod tests {
         for place in 0..4 {
             let mut p = array![1.0, 2.0, 3.0, 4.0];
             p[place] = f64::NAN;
-            assert!(rmse(&p, &zero).unwrap().is_nan());
+            let expected = Error::NotFinite {
+                what: "predictions",
+                row: place,
+                column: 0,
+            };
+            assert_eq!(rmse(&p, &zero), Err(expected));
         }
     }
 

@@ -14,7 +14,7 @@ use crate::solve::moments::{HiddenRows, RowSource};
 use crate::solve::{
     LeastSquares, Solver, check_length, check_matrix, check_room, check_some_weight,
 };
-use crate::validate::{HeldOut, Validator};
+use crate::validate::{FoldFit, HeldOut, Validator};
 
 /// Settings of an extreme learning machine. Setters never fail; [`check`](Self::check) and
 /// [`fit`](Self::fit) say what is out of range.
@@ -273,6 +273,22 @@ impl<A: Scalar> ElmParams<A> {
 }
 
 /// Settings that are in range; made by [`ElmParams::check`].
+///
+/// ```
+/// use elm::{ElmParams, Error, validate::assign_folds};
+/// use ndarray::{Array1, Axis};
+///
+/// let refused = ElmParams::<f64>::new(0).check();
+/// assert!(matches!(refused, Err(Error::Parameter { name: "neurons", .. })));
+///
+/// let x = Array1::linspace(-3.0, 3.0, 60).insert_axis(Axis(1));
+/// let t = x.mapv(f64::sin);
+/// let params = ElmParams::new(20).check()?;
+/// let folds = assign_folds(60, 10, 1)?;
+/// let held_out = params.cross_validate(&x, &t, &folds)?;
+/// assert!(held_out.rmse()[0] < 1e-2);
+/// # Ok::<(), elm::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckedParams<A: Scalar>(ElmParams<A>);
 
@@ -360,7 +376,32 @@ impl<A: Scalar> CheckedParams<A> {
         t: &T,
         folds: &[usize],
     ) -> Result<HeldOut<A>> {
-        let t = t.as_matrix();
+        let (validator, lambda) = self.in_closed_form(x.view(), t.as_matrix())?;
+        validator.k_fold(folds, &lambda)
+    }
+
+    /// What the fit without each fold predicts for **every** row, those that it was fitted to
+    /// among them: as [`cross_validate`](Self::cross_validate), with the fits' training errors
+    /// beside the held-out ones. One entry per fold, in rising order of its label.
+    ///
+    /// # Errors
+    /// Those of [`cross_validate`](Self::cross_validate).
+    pub fn cross_fits<T: Targets<A>>(
+        &self,
+        x: &ArrayRef2<A>,
+        t: &T,
+        folds: &[usize],
+    ) -> Result<Vec<FoldFit<A>>> {
+        let (validator, lambda) = self.in_closed_form(x.view(), t.as_matrix())?;
+        validator.k_fold_fits(folds, &lambda)
+    }
+
+    /// The problem, factorised, and the strengths of its solver.
+    fn in_closed_form(
+        &self,
+        x: ArrayView2<'_, A>,
+        t: ArrayView2<'_, A>,
+    ) -> Result<(Validator<A>, Vec<f64>)> {
         let conflict = |first| {
             Err(Error::Conflict {
                 first,
@@ -375,12 +416,12 @@ impl<A: Scalar> CheckedParams<A> {
             Solver::PseudoInverse(_) => None,
             Solver::Ridge(ridge) => Some(ridge),
         };
-        let validator = self.validator(x.view(), t)?;
+        let validator = self.validator(x, t)?;
         let lambda = match ridge {
             Some(ridge) => validator.strengths(ridge)?,
             None => vec![0.0],
         };
-        validator.k_fold(folds, &lambda)
+        Ok((validator, lambda))
     }
 
     /// Draws the layer, applies it, and factorises.

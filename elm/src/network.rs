@@ -5,11 +5,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::hidden::HiddenLayer;
+use crate::metrics::root_mean_squares;
 use crate::predictor::Predictor;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
 use crate::solve::spectrum::norm;
-use crate::solve::{Diagnosis, Reason, Solution, check_length, check_matrix};
+use crate::solve::{Diagnosis, Reason, Solution, check_length, check_matrix, check_room};
 
 /// Project, activate, and append the inputs where they are linked directly.
 pub(crate) fn design<A: Scalar>(
@@ -29,6 +30,18 @@ pub(crate) fn design<A: Scalar>(
 
 /// A fitted network: $o(x) = \sum_k \beta_k f(\omega_k \cdot x + b_k)$ (equation 7) plus, where
 /// set, an intercept and direct links. Made by [`ElmParams::fit`](crate::ElmParams::fit).
+///
+/// ```
+/// use elm::ElmParams;
+/// use ndarray::array;
+///
+/// let (x, t) = (array![[0.0], [1.0], [2.0], [3.0]], array![0.0, 1.0, 4.0, 9.0]);
+/// let model = ElmParams::new(10).fit(&x, &t)?;
+/// // A prediction is the hidden-layer matrix times the output weights, plus the intercept.
+/// let by_hand = model.hidden_matrix(&x)?.dot(&model.beta()) + &model.intercept();
+/// assert!((model.predict(&x)? - by_hand).iter().all(|d: &f64| d.abs() < 1e-9));
+/// # Ok::<(), elm::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "", try_from = "Parts<A>")]
 pub struct Elm<A: Scalar> {
@@ -59,11 +72,10 @@ pub(crate) fn check_layer<A: Scalar>(
     scaler: Option<&Scaler<A>>,
 ) -> Result<()> {
     hidden.check()?;
-    for vector in scaler.iter().flat_map(|s| [s.mean(), s.factor()]) {
-        check_length("inputs of the scaler", vector.len(), hidden.inputs())?;
-        check_matrix("the scaler", vector.insert_axis(Axis(0)))?;
+    match scaler {
+        Some(scaler) => check_length("inputs of the scaler", scaler.mean().len(), hidden.inputs()),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 impl<A: Scalar> Elm<A> {
@@ -119,7 +131,7 @@ impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
             direct_links,
             beta,
             intercept,
-            diagnosis,
+            mut diagnosis,
         } = parts;
         check_layer(&hidden, scaler.as_ref())?;
         let (inputs, neurons) = hidden.weights().dim();
@@ -128,6 +140,7 @@ impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
         check_length("rows of output weights", beta.nrows(), columns)?;
         check_length("intercepts", intercept.len(), beta.ncols())?;
         check_matrix("intercepts", intercept.view().insert_axis(Axis(0)))?;
+        diagnosis.check(beta.ncols())?;
         Ok(Self {
             scaler,
             hidden,
@@ -220,10 +233,8 @@ impl<A: Scalar> Elm<A> {
 
     /// Records residuals and leave-one-out residuals, shape (rows, outputs), in the diagnosis.
     pub(crate) fn set_errors(&mut self, residuals: ArrayView2<'_, A>, left_out: ArrayView2<'_, A>) {
-        let root_rows = (left_out.nrows() as f64).sqrt();
-        let left_out = left_out.columns().into_iter().map(norm);
         self.diagnosis.residual_norm = residuals.columns().into_iter().map(norm).collect();
-        self.diagnosis.leave_one_out = Some(left_out.map(|norm| norm / root_rows).collect());
+        self.diagnosis.leave_one_out = Some(root_mean_squares(left_out).to_vec());
     }
 
     /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs).
@@ -248,10 +259,11 @@ impl<A: Scalar> Elm<A> {
     /// Times [`beta`](Self::beta) plus [`intercept`](Self::intercept) it is the prediction.
     ///
     /// # Errors
-    /// [`Error::Shape`], [`Error::Empty`] and [`Error::NotFinite`] for `x`.
+    /// [`Error::Shape`], [`Error::Empty`] and [`Error::NotFinite`] for `x`; [`Error::TooLarge`].
     pub fn hidden_matrix(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
         check_length("inputs", x.ncols(), self.inputs())?;
         check_matrix("inputs", x.view())?;
+        check_room("the hidden-layer matrix", x.nrows(), self.beta.nrows())?;
         let scaled = self
             .scaler
             .as_ref()

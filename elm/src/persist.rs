@@ -68,7 +68,7 @@ pub enum Error {
         supported: u32,
     },
     /// It holds something else.
-    #[error("the file holds '{found}', expected '{expected}'")]
+    #[error("the file holds '{}', expected '{expected}'", brief(found))]
     Kind {
         /// What it holds.
         found: String,
@@ -76,7 +76,7 @@ pub enum Error {
         expected: &'static str,
     },
     /// Its numbers are of another type.
-    #[error("the file's numbers are {found}, expected {expected}")]
+    #[error("the file's numbers are {}, expected {expected}", brief(found))]
     ScalarType {
         /// The file's type.
         found: String,
@@ -351,8 +351,19 @@ fn check_head<T: Persist>(version: u32, kind: &str, scalar: &str) -> Result<(), 
 fn contents<T: Persist>(reason: impl std::fmt::Display) -> Error {
     Error::Contents {
         kind: T::KIND,
-        reason: reason.to_string(),
+        reason: brief(&reason.to_string()),
     }
+}
+
+/// What a file says, made fit for an error: one line, and not a long one.
+fn brief(text: &str) -> String {
+    const LONGEST: usize = 200;
+    let printable = |c: char| if c.is_control() { ' ' } else { c };
+    let mut brief: String = text.chars().take(LONGEST).map(printable).collect();
+    if brief.len() < text.len() {
+        brief.push_str("...");
+    }
+    brief
 }
 
 struct Reader<'a> {

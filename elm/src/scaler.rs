@@ -11,12 +11,43 @@ use crate::solve::{check_length, check_matrix};
 ///
 /// An input that is constant over the training rows carries no information and is mapped to 0,
 /// whatever value it takes later.
+///
+/// ```
+/// use elm::Scaler;
+/// use ndarray::array;
+///
+/// let scaler = Scaler::measured(&array![[1.0, 0.5], [3.0, 0.5]])?;
+/// assert_eq!(scaler.mean(), array![2.0, 0.5]);
+/// // The second input is constant.
+/// assert_eq!(scaler.factor(), array![1.0, 0.0]);
+/// # Ok::<(), elm::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[serde(bound = "", try_from = "Parts<A>")]
 pub struct Scaler<A: Scalar> {
     mean: Array1<A>,
     /// 1 / standard deviation; 0 for a constant input.
     factor: Array1<A>,
+}
+
+/// A [`Scaler`] from outside, before it is known to make sense.
+#[derive(Deserialize)]
+#[serde(bound = "")]
+struct Parts<A: Scalar> {
+    mean: Array1<A>,
+    factor: Array1<A>,
+}
+
+impl<A: Scalar> TryFrom<Parts<A>> for Scaler<A> {
+    type Error = Error;
+
+    fn try_from(Parts { mean, factor }: Parts<A>) -> Result<Self> {
+        check_length("factors of the scaler", factor.len(), mean.len())?;
+        for vector in [&mean, &factor] {
+            check_matrix("the scaler", vector.view().insert_axis(Axis(0)))?;
+        }
+        Ok(Self { mean, factor })
+    }
 }
 
 impl<A: Scalar> Scaler<A> {

@@ -31,9 +31,10 @@
 //! # Ok::<(), elm::Error>(())
 //! ```
 
-use ndarray::{Array1, Array2, ArrayRef2, ArrayView2, Axis, Zip, s};
+use ndarray::{Array1, Array2, ArrayRef2, ArrayView2, Zip, s};
 
 use crate::error::{Error, Result};
+use crate::metrics::root_mean_squares;
 use crate::model::{CheckedParams, ElmParams, Targets};
 use crate::network::Elm;
 use crate::scalar::Scalar;
@@ -44,6 +45,21 @@ use crate::validate::Validator;
 /// [`ElmParams::fit_ensemble`].
 ///
 /// Keeps one number per training row and neuron beside the network.
+///
+/// ```
+/// use elm::ElmParams;
+/// use ndarray::{Array1, Axis, array};
+///
+/// let x = Array1::linspace(-3.0, 3.0, 80).insert_axis(Axis(1));
+/// let t = x.mapv(|x: f64| x.sin() + 0.1 * (37.0 * x).sin());
+/// let model = ElmParams::new(20).fit_uncertain(&x, &t)?;
+/// // The noise is a sine of amplitude 0.1, of standard deviation 0.07.
+/// assert!((0.05..0.1).contains(&model.noise()[0]));
+/// let y = model.model().predict(&array![[1.0]])?;
+/// let (low, high) = model.predict_interval(&array![[1.0]], 0.8)?;
+/// assert!(low[[0, 0]] < y[[0, 0]] && y[[0, 0]] < high[[0, 0]]);
+/// # Ok::<(), elm::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct UncertainElm<A: Scalar> {
     /// The mean of the members, the member itself where there is one.
@@ -273,7 +289,8 @@ impl<A: Scalar> UncertainElm<A> {
 
     /// Lower and upper ends of jackknife+ intervals that cover a new observation with about this
     /// probability: shape (rows, inputs) to two of (rows, outputs). With too few training rows
-    /// for the coverage asked for (fewer than $1 / (1 - \text{coverage}) - 1$) they are infinite.
+    /// for the coverage asked for (fewer than $1 / (1 - \text{coverage}) - 1$) they are infinite;
+    /// for one below a half the lower end may lie above the upper: the interval is empty.
     ///
     /// Costs training rows x neurons for each row of `x`.
     ///
@@ -298,6 +315,8 @@ impl<A: Scalar> UncertainElm<A> {
         let rows = self.left_out.nrows();
         // The k-th smallest and largest of n ends, k = floor(alpha (n + 1)).
         let outside = ((1.0 - coverage) * (rows as f64 + 1.0) + 1e-9).floor() as usize;
+        // A coverage near 0 would leave out more ends than there are.
+        let outside = outside.min(rows);
         let mut low = Array2::from_elem(predicted.dim(), A::neg_infinity());
         let mut high = Array2::from_elem(predicted.dim(), A::infinity());
         if outside == 0 {
@@ -331,13 +350,6 @@ impl<A: Scalar> UncertainElm<A> {
         }
         Ok((low, high))
     }
-}
-
-fn root_mean_squares<A: Scalar>(residuals: ArrayView2<'_, A>) -> Array1<f64> {
-    let ones = Array1::ones(residuals.nrows());
-    residuals.map_axis(Axis(0), |column| {
-        crate::metrics::root_mean_square(column, ones.view())
-    })
 }
 
 fn finite<A: Scalar>(values: Array2<A>) -> Result<Array2<A>> {

@@ -19,7 +19,7 @@
 //! # How
 //! Leaving out the rows of a fold $F$ gives the same fit as giving each of them a parameter of its
 //! own (the mean-shift model), whose values are the held-out residuals $e_F$. Eliminating
-//! $\beta$ leaves $(I - S_{FF})\, e_F = r_F$ with $S$ the matrix that maps targets to fitted values
+//! $\beta$ leaves $(I - S_{FF})\\, e_F = r_F$ with $S$ the matrix that maps targets to fitted values
 //! and $r$ the residual of the full fit (Cook and Weisberg, Residuals and Influence in Regression,
 //! 1982, for one row $e_i = r_i / (1 - h_i)$). With singular vectors $U$ and shares $f$ held back
 //! by ridge,
@@ -37,6 +37,7 @@
 //! standardise on the training rows of each fold and refit. Choosing $\lambda$ by a held-out score
 //! and then quoting that score as the error is the usual mild optimism of model selection.
 
+mod fits;
 mod fold;
 mod held_out;
 
@@ -48,7 +49,8 @@ use rand_chacha::ChaCha8Rng;
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 use crate::solve::spectrum::{RowSpectrum, Spectrum, rounding};
-use crate::solve::{LeastSquares, Ridge, check_length};
+use crate::solve::{LeastSquares, Ridge, check_length, check_room};
+pub use fits::FoldFit;
 use fold::Fold;
 pub use held_out::{HeldOut, Path};
 
@@ -61,6 +63,21 @@ pub use held_out::{HeldOut, Path};
 /// its own fit, and $\epsilon$ times a modest number elsewhere.
 ///
 /// Rows of weight 0 are predicted like all others, without the rest of their fold.
+///
+/// ```
+/// use elm::solve::{LeastSquares, Ridge};
+/// use elm::validate::Validator;
+/// use ndarray::{Array2, array};
+///
+/// let h = Array2::from_shape_fn((12, 3), |(i, j)| (i as f64 * 0.7 + j as f64).sin());
+/// let t = h.dot(&array![[1.0], [-2.0], [0.5]]);
+/// let validator = Validator::new(&LeastSquares::new(&h, &t)?)?;
+/// let lambda = validator.strengths(Ridge::default())?;
+/// // What each row is predicted to be by the fit to the eleven others.
+/// let held_out = validator.leave_one_out(&lambda)?;
+/// assert!(held_out.rmse()[0] < 1e-6);
+/// # Ok::<(), elm::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Validator<A: Scalar> {
     rows: RowSpectrum<A>,
@@ -393,16 +410,9 @@ impl<A: Scalar> Validator<A> {
         if places.is_empty() {
             return residuals;
         }
-        let spectrum = &self.rows.spectrum;
-        let frame = &spectrum.frame;
-        // Leaving rows out is fitting the targets less their held-out residuals.
-        let mut c = spectrum.c.select(Axis(1), outputs);
-        c -= &A::product(self.rows.u.select(Axis(0), rows).t(), inner.view());
-        c *= &spectrum.ridge_kept(strength).insert_axis(Axis(1));
-        let constant =
-            self.rows.constant.select(Axis(0), rows).dot(inner) / -frame.total_weight.sqrt();
+        let frame = &self.rows.spectrum.frame;
         let coordinates = self.absent_coordinates.select(Axis(0), places);
-        let fitted = A::product(coordinates.view(), c.view()) + &constant;
+        let fitted = self.fitted_without(rows, inner, strength, outputs, &coordinates);
         for (column, &output) in outputs.iter().enumerate() {
             for (row, &place) in places.iter().enumerate() {
                 let above_mean = fitted[[row, column]] * frame.target_scale[output];
@@ -419,7 +429,7 @@ impl<A: Scalar> Validator<A> {
 /// gives one assignment on every platform.
 ///
 /// # Errors
-/// [`Error::Parameter`] unless $2 \le$ `folds` $\le$ `rows`.
+/// [`Error::Parameter`] unless $2 \le$ `folds` $\le$ `rows`; [`Error::TooLarge`].
 pub fn assign_folds(rows: usize, folds: usize, seed: u64) -> Result<Vec<usize>> {
     if folds < 2 || folds > rows {
         return Err(Error::Parameter {
@@ -428,6 +438,7 @@ pub fn assign_folds(rows: usize, folds: usize, seed: u64) -> Result<Vec<usize>> 
             expected: "at least 2 and at most the number of rows",
         });
     }
+    check_room("the fold labels", rows, 1)?;
     let mut labels: Vec<usize> = (0..rows).map(|row| row % folds).collect();
     labels.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
     Ok(labels)

@@ -376,6 +376,57 @@ fn chunks_from_an_iterator_are_fitted_and_its_error_is_passed_on() {
     );
 }
 
+#[cfg(feature = "rayon")]
+#[test]
+fn parts_of_chunks_give_one_answer_on_any_number_of_threads() {
+    let (x, t) = data::<f64>(400, 14);
+    let params = ElmParams::new(9).solver(Ridge::gcv()).check().unwrap();
+    let chunks = |rows: usize| {
+        let pieces = x
+            .axis_chunks_iter(Axis(0), rows)
+            .zip(t.axis_chunks_iter(Axis(0), rows));
+        pieces.map(|(x, t)| Ok::<_, Error>((x.to_owned(), t.to_owned())))
+    };
+    let on = |threads: usize, rows: usize, parts: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let pool = pool.build().unwrap();
+        pool.install(|| params.fit_chunks_parallel(chunks(rows), parts))
+    };
+    for (rows, parts) in [(30, 1), (30, 2), (7, 5), (150, 8), (400, 3)] {
+        let model = on(1, rows, parts).unwrap();
+        for threads in [2, 3] {
+            assert_eq!(on(threads, rows, parts).unwrap(), model);
+        }
+        let sequential = params.fit_chunks(chunks(rows)).unwrap();
+        assert_same_fit(&model, &sequential, &x, "parts");
+    }
+    // Errors: no parts, too many, none of the chunks, the reader's, a chunk's.
+    assert!(matches!(
+        on(1, 30, 0),
+        Err(Error::Parameter { name: "parts", .. })
+    ));
+    assert!(matches!(on(1, 30, usize::MAX), Err(Error::TooLarge { .. })));
+    let nothing = std::iter::empty::<Result<_, Error>>();
+    assert!(matches!(
+        params.fit_chunks_parallel(nothing, 2),
+        Err(Error::Empty { what: "chunks", .. })
+    ));
+    let broken = Error::NoConvergence { what: "reading" };
+    let all = chunks(30).take(3).chain([Err(broken.clone())]);
+    assert_eq!(params.fit_chunks_parallel(all, 2), Err(broken));
+    let mut bad = (x.clone(), t.clone());
+    bad.1[[3, 1]] = f64::NAN;
+    let all = chunks(30).take(3).chain([Ok(bad)]);
+    assert!(matches!(
+        params.fit_chunks_parallel(all, 2),
+        Err(Error::NotFinite {
+            what: "targets",
+            row: 3,
+            column: 1
+        })
+    ));
+}
+
 #[test]
 fn an_accumulator_survives_serialisation() {
     let (x, t) = data::<f64>(200, 15);

@@ -5,8 +5,7 @@
 use elm::persist::{self, Error};
 use elm::solve::Ridge;
 use elm::{Accumulator, Activation, Elm, ElmParams, Kind, Neurons};
-use ndarray::{Array2, array, s};
-use proptest::prelude::*;
+use ndarray::{Array2, s};
 
 fn data() -> (Array2<f64>, Array2<f64>) {
     let x = Array2::from_shape_fn((30, 3), |(i, j)| ((i * (j + 2)) as f64 * 0.37).sin());
@@ -220,37 +219,20 @@ fn a_file_that_contradicts_itself_is_refused() {
     }
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(512))]
-
-    #[test]
-    fn no_bytes_make_reading_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
-        let _ = persist::from_bytes::<Elm<f64>>(&bytes);
-    }
-
-    #[test]
-    fn no_damage_to_a_model_makes_reading_or_predicting_panic(
-        json in any::<bool>(), at in any::<prop::sample::Index>(), value in any::<u8>(),
-        fix in any::<bool>(),
-    ) {
-        let (x, t) = (array![[0.0], [1.0], [2.0]], array![0.0, 1.0, 4.0]);
-        let params = ElmParams::new(3).and(Neurons::radial(2));
-        let model = params.fit(&x, &t).unwrap();
-        let mut bytes = if json {
-            persist::to_json(&model).unwrap().into_bytes()
-        } else {
-            persist::to_bytes(&model).unwrap()
-        };
-        let at = at.index(bytes.len());
-        bytes[at] = value;
-        if fix && !json {
-            // With the checksum made right again the decoder itself is what stands guard.
-            let payload = bytes.len().min(8 + 4 + 10 + 4 + 12);
-            let crc = crc32fast::hash(&bytes[payload..]).to_le_bytes();
-            bytes[payload - 4..payload].copy_from_slice(&crc);
-        }
-        if let Ok(model) = persist::from_bytes::<Elm<f64>>(&bytes) {
-            let _ = model.predict(&x);
-        }
-    }
+#[test]
+fn a_fit_at_the_end_of_the_range_survives_json() {
+    // The norm of forty residuals as large as these is infinite.
+    let x = Array2::from_shape_fn((40, 1), |(row, _)| row as f64);
+    let t = Array2::from_shape_fn(
+        (40, 1),
+        |(row, _)| if row % 2 == 0 { 4e307 } else { -4e307 },
+    );
+    let model = ElmParams::new(1)
+        .solver(Ridge::relative(1e3))
+        .fit(&x, &t)
+        .unwrap();
+    assert_eq!(model.diagnosis().residual_norm, [f64::MAX]);
+    let text = persist::to_json(&model).unwrap();
+    let again: Elm<f64> = persist::from_bytes(text.as_bytes()).unwrap();
+    assert_eq!(again, model);
 }

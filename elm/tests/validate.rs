@@ -80,6 +80,52 @@ fn k_fold_predictions_are_those_of_refitting_without_each_fold() {
 }
 
 #[test]
+fn the_fits_without_each_fold_are_those_of_refitting_on_all_rows() {
+    for (name, problem) in problems::<f64>() {
+        let rows = problem.hidden.nrows();
+        if rows < 2 {
+            continue;
+        }
+        let validator = Validator::new(&problem.view()).unwrap();
+        let s = problem
+            .solve(Ridge::relative(1.0))
+            .diagnosis
+            .largest_singular_value;
+        for (lambda, folds) in [1e-6, 1e-2].into_iter().flat_map(|lambda| {
+            let divisions = divisions(rows).into_iter();
+            divisions.map(move |folds| (lambda, folds))
+        }) {
+            let held_out = validator.k_fold(&folds, &[lambda]).unwrap();
+            let fits = validator.k_fold_fits(&folds, &[lambda]).unwrap();
+            let mut labels = folds.clone();
+            labels.sort_unstable();
+            labels.dedup();
+            assert!(fits.iter().map(elm::validate::FoldFit::label).eq(labels));
+            for fit in &fits {
+                let out: Vec<usize> = (0..rows).filter(|&r| folds[r] == fit.label()).collect();
+                for &row in &out {
+                    // Rows without weight are predicted by another route in each.
+                    let (a, b) = (fit.predictions(), held_out.predictions());
+                    let error = (&a.row(row) - &b.row(row)).mapv(f64::abs).sum();
+                    assert!(
+                        error <= 1e-12 * frobenius(&problem.targets),
+                        "{name}: {error:e}"
+                    );
+                }
+                let truth = problem.fit_without(&out, lambda * s * s);
+                let error = frobenius(&(&fit.predictions() - &truth));
+                let scale = frobenius(&truth) + frobenius(&problem.targets);
+                assert!(
+                    error <= 1e-9 * scale,
+                    "{name}, lambda {lambda:e}, folds {folds:?}: {:e}",
+                    error / scale
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn leave_one_out_is_k_fold_with_one_row_in_each_fold() {
     for (name, problem) in problems::<f64>() {
         let rows = problem.hidden.nrows();

@@ -1,4 +1,7 @@
-//! Tests that cross the crates; see `tests/`.
+//! Tests that cross the crates; see `tests/`. What they share with the fuzz targets is
+//! [`any_bytes`].
+
+pub mod any_bytes;
 
 // The README's code is compiled and run with the documentation tests.
 #[cfg(doctest)]

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use elm::solve::Solver;
 use elm::{Activation, ElmParams};
 use elm_datasets::{Invalid, Measurements};
@@ -14,7 +14,7 @@ use super::{Failure, print};
 use crate::brdf::Fit;
 use crate::features::Features;
 use crate::link::Link;
-use crate::model::BrdfParams;
+use crate::model::{BrdfParams, ScaledOnce};
 use crate::protocol::{Folds, MaterialScores, cross_validate};
 use crate::report::plot::{self, Shown};
 use crate::report::{Format, Protocol, Report, Seconds};
@@ -70,6 +70,11 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NAME", default_value = "pseudo-inverse",
           value_parser = one_of::<Solver>(Solver::NAMES.split(", ")))]
     solver: Solver,
+    /// Which rows the inputs are scaled by: the training rows of each fold, or once all rows,
+    /// which takes a single factorisation for all folds (with the pseudo-inverse only). Held-out
+    /// directions then enter the scale; held-out values never do.
+    #[arg(long, value_enum, value_name = "WHEN", default_value_t = Scaling::Fold)]
+    scaling: Scaling,
     /// Form of the output.
     #[arg(long, value_name = "FORM", default_value = "table",
           value_parser = one_of::<Format>(Format::ALL.map(Format::name)))]
@@ -87,6 +92,22 @@ pub(super) struct Arguments {
     invalid: Invalid,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Scaling {
+    Fold,
+    Once,
+}
+
+impl Scaling {
+    /// The name in reports.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Fold => "fold",
+            Self::Once => "once",
+        }
+    }
+}
+
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
     let params = |seed| BrdfParams {
@@ -101,6 +122,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let first = params(arguments.seed);
     first.network.clone().check().map_err(usage)?;
+    let once = arguments.scaling == Scaling::Once;
+    if once && !matches!(arguments.solver, Solver::PseudoInverse(_)) {
+        // Ridge's strength would be chosen on the held-out values too.
+        return Err(usage(format_args!(
+            "--scaling once needs --solver pseudo-inverse, found --solver {}",
+            arguments.solver
+        )));
+    }
 
     let source = Source::find(arguments.data.as_deref())?;
     let materials = source.select(&arguments.materials)?;
@@ -117,6 +146,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         neurons: arguments.neurons,
         activation: arguments.activation.name().to_owned(),
         solver: arguments.solver.name().to_owned(),
+        scaling: arguments.scaling.name().to_owned(),
         folds: arguments.folds,
         seed: arguments.seed,
         seeds: seeds.len(),
@@ -126,15 +156,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut runs = Vec::new();
     for (index, &seed) in seeds.iter().enumerate() {
         let folds = Folds::new(rows, arguments.folds, seed).map_err(usage)?;
-        runs.push(cross_validate(
-            &params(seed),
-            &data,
-            &folds,
-            |done, all| {
-                progress.set_length((all * seeds.len()) as u64);
-                progress.set_position((all * index + done) as u64);
-            },
-        )?);
+        let method: Box<dyn Fit> = if once {
+            Box::new(ScaledOnce::new(params(seed))?)
+        } else {
+            Box::new(params(seed))
+        };
+        runs.push(cross_validate(&*method, &data, &folds, |done, all| {
+            progress.set_length((all * seeds.len()) as u64);
+            progress.set_position((all * index + done) as u64);
+        })?);
     }
     progress.finish_and_clear();
 

@@ -180,9 +180,9 @@ pub fn curet(
         let url = find(&links, file, &html.url)?;
         let body = get(&agent, &url, |bytes| step(file, index + 1, bytes))?;
         if file == curet::TABLE {
-            curet::check_table(&body.bytes, &body.url)?;
+            curet::parse_table(&body.bytes, &body.url)?;
         } else {
-            curet::check_values(&body.bytes, &body.url)?;
+            curet::parse_values(&body.bytes, &body.url)?;
         }
         let sha256 = hexadecimal(&Sha256::digest(&body.bytes));
         let known = KNOWN.into_iter().find(|&(name, _)| name == file);

@@ -11,6 +11,7 @@
 
 mod file;
 mod layer;
+mod scaled_once;
 mod tuned;
 
 use std::path::Path;
@@ -26,6 +27,7 @@ use crate::geometry::Pair;
 use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
 pub use layer::{Draw, Layer};
+pub use scaled_once::ScaledOnce;
 pub use tuned::Tuned;
 pub(crate) use tuned::{SideBySide, without_weights};
 

@@ -76,6 +76,9 @@ pub struct Protocol {
     pub activation: String,
     /// Solver of the output weights.
     pub solver: String,
+    /// Which rows the network's inputs are scaled by: `fold`, the training rows of each fold, or
+    /// `once`, all of them.
+    pub scaling: String,
     /// Number of folds.
     pub folds: usize,
     /// Seed of the random layer and of the folds; the first where there are several.

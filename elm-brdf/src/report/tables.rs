@@ -171,14 +171,18 @@ fn heading(out: &mut String, report: &Report, style: Style) {
     push(
         out,
         format_args!(
-            "{item}Model: {} ({} inputs, {} target), {} {} neurons, {}; {}-fold cross-validation, \
-             {}\n",
+            "{item}Model: {} ({} inputs, {} target), {} {} neurons, {}; inputs scaled {}; {}-fold \
+             cross-validation, {}\n",
             protocol.model,
             protocol.features,
             protocol.target,
             protocol.neurons,
             protocol.activation,
             protocol.solver,
+            match protocol.scaling.as_str() {
+                "once" => "once, by all rows",
+                _ => "in each fold",
+            },
             protocol.folds,
             seeds(protocol.seed, protocol.seeds),
         ),

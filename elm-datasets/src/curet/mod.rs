@@ -25,9 +25,9 @@ use ndarray::{Array2, ArrayViewMut1};
 pub use names::{MATERIALS, MaterialId, NAMES};
 pub use write::write;
 
-use crate::Error;
 use crate::file;
 use crate::measurements::{Invalid, Material, Measurements, Origin};
+use crate::{Directions, Error};
 
 /// How many pairs of directions there are.
 pub const MEASUREMENTS: usize = 205;
@@ -117,22 +117,23 @@ pub fn read(dir: &Path, ids: &[MaterialId], invalid: Invalid) -> Result<Measurem
     ))
 }
 
-/// Checks that these are the bytes of a whole `table.txt`. `name` takes the place of the file in
+/// The directions in the bytes of a whole `table.txt`. `name` takes the place of the file in
 /// errors.
 ///
 /// # Errors
 /// As for [`read`], of a damaged file.
-pub fn check_table(bytes: &[u8], name: impl AsRef<Path>) -> Result<(), Error> {
-    parse::table(name.as_ref(), bytes).map(|_| ())
+pub fn parse_table(bytes: &[u8], name: impl AsRef<Path>) -> Result<Vec<Directions>, Error> {
+    parse::table(name.as_ref(), bytes)
 }
 
-/// Checks that these are the bytes of a whole value file, with all materials. `name` takes the
-/// place of the file in errors.
+/// The values in the bytes of a whole value file: shape (61 materials, 205 measurements). `name`
+/// takes the place of the file in errors.
 ///
 /// # Errors
 /// As for [`read`], of a damaged file.
-pub fn check_values(bytes: &[u8], name: impl AsRef<Path>) -> Result<(), Error> {
+pub fn parse_values(bytes: &[u8], name: impl AsRef<Path>) -> Result<Array2<f64>, Error> {
     let mut values = Array2::zeros((MATERIALS, MEASUREMENTS));
     let mut rows: Vec<_> = values.rows_mut().into_iter().map(Some).collect();
-    parse::values(name.as_ref(), bytes, |id| rows[id.index()].take())
+    parse::values(name.as_ref(), bytes, |id| rows[id.index()].take())?;
+    Ok(values)
 }

@@ -33,6 +33,16 @@ const ALIASES: [(&str, usize); 2] = [("foil", 15), ("aluminiumfoil", 15)];
 ///
 /// Its text form, for [`Display`](fmt::Display) and in serialised data, is that number.
 /// [`FromStr`] takes the number or one of CUReT's names.
+///
+/// ```
+/// use elm_datasets::MaterialId;
+///
+/// let felt: MaterialId = "felt".parse()?;
+/// assert_eq!((felt.number(), felt), (1, MaterialId::new(1)?));
+/// assert!("felp".parse::<MaterialId>().is_err_and(|error| error.to_string().contains("Felt")));
+/// assert_eq!(MaterialId::all().count(), 61);
+/// # Ok::<(), elm_datasets::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "usize", into = "usize")]
 pub struct MaterialId(u8);

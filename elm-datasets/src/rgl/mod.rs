@@ -81,18 +81,19 @@ pub enum Problem {
     /// A field of a type that is not known.
     #[error("field {field:?}: expected a type from 1 to 11, found {found}")]
     FieldType {
-        /// Name of the field.
+        /// Name of the field, shortened if long.
         field: String,
         /// Code of the type.
         found: u8,
     },
     /// A field whose numbers are not within the file.
     #[error(
-        "field {field:?}: expected shape {shape:?} from byte {offset} to lie within the file's \
-         {file} bytes"
+        "field {field:?}: expected shape {} from byte {offset} to lie within the file's {file} \
+         bytes",
+        brief(shape)
     )]
     FieldData {
-        /// Name of the field.
+        /// Name of the field, shortened if long.
         field: String,
         /// Where its numbers begin.
         offset: u64,
@@ -108,7 +109,10 @@ pub enum Problem {
         field: &'static str,
     },
     /// A field of another type or shape.
-    #[error("field {field:?}: expected {expected}, found type {code} of shape {shape:?}")]
+    #[error(
+        "field {field:?}: expected {expected}, found type {code} of shape {}",
+        brief(shape)
+    )]
     Layout {
         /// Name of the field.
         field: &'static str,
@@ -148,6 +152,15 @@ pub enum Problem {
     },
 }
 
+/// A shape for an error: a file may claim any number of dimensions.
+fn brief(shape: &[u64]) -> String {
+    const MOST: usize = 6;
+    if shape.len() <= MOST {
+        return format!("{shape:?}");
+    }
+    format!("{:?}... ({} dimensions)", &shape[..MOST], shape.len())
+}
+
 /// The channels of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Channels {
@@ -183,6 +196,15 @@ impl Channels {
 }
 
 /// An isotropic material of the RGL database.
+///
+/// ```no_run
+/// use elm_datasets::{Sampling, rgl::Rgl};
+///
+/// let material = Rgl::read("acrylic_felt_green_rgb.bsdf")?;
+/// let samples = material.samples(&Sampling::Random { rows: 20_000, seed: 1 })?;
+/// assert_eq!(samples.channels, ["red", "green", "blue"]);
+/// # Ok::<(), elm_datasets::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rgl {
     channels: Channels,
@@ -257,19 +279,11 @@ impl Rgl {
         let count = channels.count() as u64;
         let values = fields.table(name, expected, &[incident[0], incident[1], count])?;
         let expected = "floats of shape (phi_i, theta_i, v, u)";
-        let vndf = fields.table("vndf", expected, &incident)?;
-        if let Some(index) = vndf.numbers.iter().position(|&number| number < 0.0) {
-            return Err(Problem::Number {
-                field: "vndf",
-                index,
-                expected: "no negative density",
-                found: vndf.numbers[index],
-            });
-        }
+        let vndf = fields.density("vndf", expected, &incident)?;
         Ok(Self {
             channels,
             jacobian: jacobian.bytes.first().is_some_and(|&byte| byte != 0),
-            ndf: fields.table("ndf", "floats of shape (v, u)", &[])?,
+            ndf: fields.density("ndf", "floats of shape (v, u)", &[])?,
             sigma: fields.table("sigma", "floats of shape (v, u)", &[])?,
             vndf: Warp::new(vndf.size, vndf.numbers.into_iter())
                 .map_err(|table| Problem::NoDensity { table })?,
@@ -410,6 +424,25 @@ impl Fields<'_> {
                 index: index + 1,
                 expected: "a number larger than the one before",
                 found: numbers[index + 1],
+            }),
+        }
+    }
+
+    /// As [`table`](Self::table), of numbers that are not negative.
+    fn density(
+        &self,
+        name: &'static str,
+        expected: &'static str,
+        leading: &[u64],
+    ) -> Result<Table, Problem> {
+        let table = self.table(name, expected, leading)?;
+        match table.numbers.iter().position(|&number| number < 0.0) {
+            None => Ok(table),
+            Some(index) => Err(Problem::Number {
+                field: name,
+                index,
+                expected: "no negative density",
+                found: table.numbers[index],
             }),
         }
     }

@@ -10,6 +10,7 @@
 //! | 8 each | sizes of the dimensions, the last running fastest |
 
 use super::Problem;
+use crate::error::shorten;
 
 pub(super) const MAGIC: &[u8; 12] = b"tensor_file\0";
 const VERSION: [u8; 2] = [1, 0];
@@ -66,7 +67,7 @@ fn field<'a>(cursor: &mut Cursor<'a>) -> Result<Field<'a>, Problem> {
         Some(&width) if width > 0 => width as u64,
         _ => {
             return Err(Problem::FieldType {
-                field: name.to_owned(),
+                field: shorten(name),
                 found: code,
             });
         }
@@ -79,7 +80,7 @@ fn field<'a>(cursor: &mut Cursor<'a>) -> Result<Field<'a>, Problem> {
         .iter()
         .try_fold(width, |product, &size| product.checked_mul(size));
     let bytes = slice(cursor.bytes, offset, length).ok_or_else(|| Problem::FieldData {
-        field: name.to_owned(),
+        field: shorten(name),
         offset,
         shape: shape.clone(),
         file: cursor.bytes.len() as u64,

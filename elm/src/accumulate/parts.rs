@@ -44,6 +44,13 @@ impl<A: Scalar> TryFrom<Parts<A>> for Accumulator<A> {
         check_length("outputs", columns.saturating_sub(own), parts.outputs)?;
         check_length("rows of the triangle", parts.triangle.nrows(), columns)?;
         check_length("scales", parts.scales.len(), columns)?;
+        if parts.weighted_rows > parts.rows {
+            return Err(Error::Shape {
+                what: "rows of positive weight",
+                expected: usize::try_from(parts.rows).unwrap_or(usize::MAX),
+                found: usize::try_from(parts.weighted_rows).unwrap_or(usize::MAX),
+            });
+        }
         if parts.outputs == 0 || parts.pending.len() >= BLOCK * columns * columns {
             return Err(Error::Shape {
                 what: "pending rows",

@@ -34,6 +34,20 @@ pub use coefficients::Coefficients;
 /// assert!((own.apply(0.0) - 2.0_f64.ln()).abs() < 1e-15);
 /// # Ok::<(), elm::Error>(())
 /// ```
+///
+/// ```
+/// use elm::{Activation, ElmParams};
+/// use ndarray::array;
+///
+/// let (x, t) = (array![[-2.0], [-1.0], [0.0], [1.0], [2.0]], array![-8.0, -1.0, 0.0, 1.0, 8.0]);
+/// let by_name: Activation<f64> = "sine".parse()?;
+/// let own = Activation::custom("cube", |z: f64| z * z * z);
+/// for activation in [by_name, own] {
+///     let model = ElmParams::new(10).activation(activation).fit(&x, &t)?;
+///     assert!((model.predict(&x)?[[4, 0]] - 8.0).abs() < 0.5);
+/// }
+/// # Ok::<(), elm::Error>(())
+/// ```
 #[derive(Clone, Default)]
 #[non_exhaustive]
 pub enum Activation<A: Scalar> {

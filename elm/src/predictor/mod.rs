@@ -18,7 +18,7 @@ use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
 use crate::simd::Level;
-use crate::solve::check_length;
+use crate::solve::{check_length, check_room};
 use kernels::{Accumulate, Project, row_blocks, sum_of_line};
 use packed::{Aligned, CHUNK_PANELS, Packed, Panels, zeros};
 
@@ -149,8 +149,10 @@ impl<A: Scalar> Predictor<A> {
     /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs), any strides.
     ///
     /// # Errors
-    /// Those of [`predict_into`](Self::predict_into).
+    /// Those of [`predict_into`](Self::predict_into); [`Error::TooLarge`].
     pub fn predict(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
+        check_length("inputs", x.ncols(), self.inputs())?;
+        check_room("the predictions", x.nrows(), self.outputs())?;
         let mut out = Array2::zeros((x.nrows(), self.outputs()));
         self.predict_into(x, &mut out, &mut self.scratch())?;
         Ok(out)

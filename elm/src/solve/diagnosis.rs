@@ -3,7 +3,9 @@
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
+use super::check_length;
 use super::spectrum::norm;
+use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 
 /// How a solver came to its answer; [`Reason`] says why so.
@@ -54,6 +56,22 @@ pub enum Reason {
 ///
 /// Singular values are those of the matrix that was factorised: the hidden-layer matrix with rows
 /// weighted and, when there is an intercept, columns centred. Vectors have one entry per output.
+/// What would overflow (the norm of residuals near the end of the range) is the largest number.
+///
+/// ```
+/// use elm::ElmParams;
+/// use ndarray::{Array1, Axis};
+///
+/// let x = Array1::linspace(-3.0, 3.0, 60).insert_axis(Axis(1));
+/// let t = x.mapv(|x: f64| x.sin() + 0.1 * (37.0 * x).sin());
+/// let model = ElmParams::new(50).fit(&x, &t)?;
+/// let diagnosis = model.diagnosis();
+/// // One input and smooth neurons: few of the 50 directions carry anything.
+/// assert!(diagnosis.degrees_of_freedom[0] < 25.0);
+/// let Some(error) = &diagnosis.leave_one_out else { panic!("ridge by leave-one-out knows it") };
+/// assert!((0.05..0.1).contains(&error[0]));
+/// # Ok::<(), elm::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Diagnosis {
@@ -88,7 +106,7 @@ impl Diagnosis {
     /// Of output weights that were given, not solved for.
     pub(crate) fn of_given<A: Scalar>(beta: ArrayView2<'_, A>) -> Self {
         let outputs = beta.ncols();
-        Self {
+        let mut diagnosis = Self {
             route: Route::Given,
             reason: Reason::GivenWeights,
             rank: None,
@@ -100,6 +118,53 @@ impl Diagnosis {
             residual_norm: vec![0.0; outputs],
             beta_norm: beta.columns().into_iter().map(norm).collect(),
             leave_one_out: None,
+        };
+        diagnosis.saturate();
+        diagnosis
+    }
+
+    /// A norm or a ratio beyond the range becomes the largest number: infinity has no place in a
+    /// JSON file.
+    pub(super) fn saturate(&mut self) {
+        for number in self.numbers_mut() {
+            if *number == f64::INFINITY {
+                *number = f64::MAX;
+            }
         }
+    }
+
+    /// Whether a diagnosis from outside has finite numbers, as many as there are outputs.
+    pub(crate) fn check(&mut self, outputs: usize) -> Result<()> {
+        let vectors = [
+            Some(&self.lambda),
+            Some(&self.degrees_of_freedom),
+            Some(&self.residual_norm),
+            Some(&self.beta_norm),
+            self.leave_one_out.as_ref(),
+        ];
+        for vector in vectors.into_iter().flatten() {
+            check_length("outputs of the diagnosis", vector.len(), outputs)?;
+        }
+        if self.numbers_mut().all(|number| number.is_finite()) {
+            return Ok(());
+        }
+        Err(Error::Overflow {
+            what: "a number of the diagnosis",
+        })
+    }
+
+    fn numbers_mut(&mut self) -> impl Iterator<Item = &mut f64> {
+        let vectors = [
+            Some(&mut self.lambda),
+            Some(&mut self.degrees_of_freedom),
+            Some(&mut self.residual_norm),
+            Some(&mut self.beta_norm),
+            self.leave_one_out.as_mut(),
+        ];
+        self.condition
+            .iter_mut()
+            .chain([&mut self.largest_singular_value])
+            .chain(&mut self.smallest_singular_value)
+            .chain(vectors.into_iter().flatten().flatten())
     }
 }

@@ -17,6 +17,17 @@ use crate::scalar::Scalar;
 /// The network passes through every training target, noise included; it exists to reproduce
 /// equation 10. For square, well-conditioned $H$ it agrees with
 /// [`PseudoInverse`](super::PseudoInverse).
+///
+/// ```
+/// use elm::{ElmParams, solve::Inverse};
+/// use ndarray::array;
+///
+/// let (x, t) = (array![[0.0], [1.0], [2.0]], array![1.0, -1.0, 1.0]);
+/// let model = ElmParams::new(3).solver(Inverse).fit(&x, &t)?;
+/// assert!((model.predict(&x)?[[1, 0]] + 1.0_f64).abs() < 1e-9);
+/// assert!(ElmParams::new(4).solver(Inverse).fit(&x, &t).is_err());
+/// # Ok::<(), elm::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Inverse;
 

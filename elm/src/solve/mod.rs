@@ -51,6 +51,20 @@ pub use pseudo_inverse::PseudoInverse;
 pub use ridge::{Lambda, Ridge};
 
 /// The problem $H\beta \approx T$: checked shapes, finite entries.
+///
+/// ```
+/// use elm::solve::{LeastSquares, PseudoInverse, Solver};
+/// use ndarray::array;
+///
+/// let (h, t) = (array![[0.0], [1.0], [2.0]], array![[5.0], [7.0], [100.0]]);
+/// // The third row counts for nothing, and a line needs its constant.
+/// let weights = array![1.0, 1.0, 0.0];
+/// let problem = LeastSquares::new(&h, &t)?.weights(&weights)?.intercept(true);
+/// let solution = Solver::from(PseudoInverse::default()).solve(&problem)?;
+/// assert!((solution.beta[[0, 0]] - 2.0_f64).abs() < 1e-12);
+/// assert!((solution.intercept[0] - 5.0_f64).abs() < 1e-12);
+/// # Ok::<(), elm::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct LeastSquares<'a, A: Scalar> {
     hidden: ArrayView2<'a, A>,
@@ -176,6 +190,21 @@ impl Solution<f64> {
 }
 
 /// One of the solvers, with its settings.
+///
+/// ```
+/// use elm::{ElmParams, solve::Solver};
+/// use ndarray::{Array1, Axis};
+///
+/// let x = Array1::linspace(-3.0, 3.0, 60).insert_axis(Axis(1));
+/// let t = x.mapv(f64::sin);
+/// for name in ["pseudo-inverse", "ridge"] {
+///     let solver: Solver = name.parse()?;
+///     let model = ElmParams::new(15).solver(solver).fit(&x, &t)?;
+///     let error = elm::metrics::rmse(&model.predict(&x)?.column(0), &t.column(0))?;
+///     assert!(error < 1e-3, "{name}: {error}");
+/// }
+/// # Ok::<(), elm::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -314,9 +343,10 @@ impl From<Ridge> for Solver {
     }
 }
 
-fn in_range<A: Scalar>(solution: Solution<A>) -> Result<Solution<A>> {
+fn in_range<A: Scalar>(mut solution: Solution<A>) -> Result<Solution<A>> {
     let finite = |x: &A| x.is_finite();
     if solution.beta.iter().all(finite) && solution.intercept.iter().all(finite) {
+        solution.diagnosis.saturate();
         Ok(solution)
     } else {
         Err(Error::Overflow {

@@ -14,6 +14,19 @@ use crate::scalar::Scalar;
 /// cut-off of one's own only those at the level of rounding error are, which is the paper's plain
 /// pseudo-inverse: it amplifies whatever noise the smallest kept directions carry, so prefer
 /// [`Ridge`](super::Ridge) unless equation 11 itself is wanted.
+///
+/// ```
+/// use elm::solve::{LeastSquares, PseudoInverse, Solver};
+/// use ndarray::array;
+///
+/// // Two neurons that are the same: the answer of least norm shares the weight between them.
+/// let (h, t) = (array![[1.0, 1.0], [2.0, 2.0]], array![[2.0], [4.0]]);
+/// let solver = Solver::from(PseudoInverse::default());
+/// let solution = solver.solve(&LeastSquares::new(&h, &t)?)?;
+/// assert_eq!(solution.diagnosis.rank, Some(1));
+/// assert!(solution.beta.iter().all(|beta: &f64| (beta - 1.0).abs() < 1e-12));
+/// # Ok::<(), elm::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PseudoInverse {
     cutoff: Option<f64>,

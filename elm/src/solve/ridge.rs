@@ -37,6 +37,21 @@ pub enum Lambda {
 /// would call for weights so large that the type cannot carry them. The search computes in `f64`
 /// whatever the type, since an ELM's directions fall far below the resolution of `f32`; $u$
 /// is that of the type.
+///
+/// ```
+/// use elm::solve::{LeastSquares, Ridge, Solver};
+/// use ndarray::array;
+///
+/// let (h, t) = (array![[1.0, 1.0], [2.0, 2.1]], array![[2.0], [4.0]]);
+/// let problem = LeastSquares::new(&h, &t)?;
+/// let norm = |lambda| -> Result<f64, elm::Error> {
+///     Ok(Solver::from(Ridge::relative(lambda)).solve(&problem)?.diagnosis.beta_norm[0])
+/// };
+/// assert!(norm(1e-2)? < norm(1e-6)?);
+/// let chosen = Solver::from(Ridge::gcv()).solve(&problem)?;
+/// assert_eq!(chosen.diagnosis.lambda.len(), 1);
+/// # Ok::<(), elm::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Ridge {
     lambda: Lambda,

@@ -14,7 +14,7 @@ use crate::solve::spectrum::rounding;
 /// Rows that are left out together.
 #[derive(Debug, Clone)]
 pub(super) struct Fold<A: Scalar> {
-    label: usize,
+    pub(super) label: usize,
     /// Those whose weight is not 0.
     pub(super) rows: Vec<usize>,
     /// Those whose weight is 0, as places in the validator's list of them.

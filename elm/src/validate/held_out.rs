@@ -7,6 +7,18 @@ use crate::solve::Ridge;
 
 /// Predictions for rows by fits that have not seen them; made by [`Validator`](super::Validator) and by
 /// [`CheckedParams::cross_validate`](crate::CheckedParams::cross_validate).
+///
+/// ```
+/// use elm::{ElmParams, validate::assign_folds};
+/// use ndarray::{Array1, Axis};
+///
+/// let x = Array1::linspace(-3.0, 3.0, 60).insert_axis(Axis(1));
+/// let t = x.mapv(f64::sin);
+/// let params = ElmParams::new(20).check()?;
+/// let held_out = params.cross_validate(&x, &t, &assign_folds(60, 6, 1)?)?;
+/// assert!((&held_out.predictions() + &held_out.residuals() - &t).iter().all(|d| d.abs() < 1e-12));
+/// # Ok::<(), elm::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldOut<A: Scalar> {
     pub(super) predictions: Array2<A>,
@@ -41,6 +53,21 @@ impl<A: Scalar> HeldOut<A> {
 }
 
 /// Held-out errors along a path of strengths; made by [`Validator`](super::Validator).
+///
+/// ```
+/// use elm::solve::{LeastSquares, Ridge};
+/// use elm::validate::Validator;
+/// use ndarray::{Array2, array};
+///
+/// let h = Array2::from_shape_fn((12, 3), |(i, j)| (i as f64 * 0.7 + j as f64).sin());
+/// let t = h.dot(&array![[1.0], [-2.0], [0.5]]);
+/// let validator = Validator::new(&LeastSquares::new(&h, &t)?)?;
+/// let path = validator.leave_one_out_path(&[1.0, 1e-3, 1e-6])?;
+/// // Without noise the weakest is the best.
+/// assert_eq!(path.best(), [1e-6]);
+/// assert!(path.rmse()[[0, 0]] > path.rmse()[[2, 0]]);
+/// # Ok::<(), elm::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
     pub(super) lambdas: Vec<f64>,

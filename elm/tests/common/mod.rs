@@ -127,6 +127,11 @@ impl<A: Scalar> Problem<A> {
     /// What ridge with this absolute strength predicts for the rows `out` when it is fitted
     /// without them, shape (`out`, outputs).
     pub(crate) fn refit_without(&self, out: &[usize], absolute: f64) -> Array2<A> {
+        self.fit_without(out, absolute).select(Axis(0), out)
+    }
+
+    /// The same for all rows.
+    pub(crate) fn fit_without(&self, out: &[usize], absolute: f64) -> Array2<A> {
         let kept: Vec<usize> = (0..self.hidden.nrows())
             .filter(|row| !out.contains(row))
             .collect();
@@ -141,7 +146,7 @@ impl<A: Scalar> Problem<A> {
         } else {
             kept.solve(Ridge::relative(1.0))
         };
-        self.hidden.select(Axis(0), out).dot(&solution.beta) + &solution.intercept
+        self.hidden.dot(&solution.beta) + &solution.intercept
     }
 }
 

@@ -1,0 +1,63 @@
+//! All folds of a cross-validation from one factorisation.
+
+use ndarray::{Array2, ArrayView2};
+
+use super::BrdfParams;
+use crate::brdf::{Brdf, Fit};
+use crate::error::{Error, Result};
+use crate::geometry::Pair;
+use crate::link::Link;
+
+/// [`BrdfParams`] that are cross-validated with their inputs standardised once, on all
+/// measurements, so that all folds come from one factorisation, in closed form.
+///
+/// The means and deviations of all **directions** then enter every fold, those of the held-out
+/// ones too; held-out **values** never do, unless the solver is ridge with a strength of its own
+/// choice, which is chosen on all rows. By default (the plain [`BrdfParams`]) each fold scales its
+/// own training rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScaledOnce(BrdfParams);
+
+impl ScaledOnce {
+    /// # Errors
+    /// [`elm::Error::Conflict`] for a link other than [`Link::Identity`], which is fitted to each
+    /// fold's values.
+    pub fn new(params: BrdfParams) -> Result<Self> {
+        if params.link == Link::Identity {
+            return Ok(Self(params));
+        }
+        Err(Error::Elm(elm::Error::Conflict {
+            first: "a link other than identity",
+            second: "inputs scaled once",
+        }))
+    }
+}
+
+impl Fit for ScaledOnce {
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+        self.0.fit(pairs, values)
+    }
+
+    fn cross_fits(
+        &self,
+        pairs: &[Pair],
+        values: ArrayView2<'_, f64>,
+        folds: &[usize],
+        count: usize,
+        done: &mut dyn FnMut(usize),
+    ) -> Result<Vec<Array2<f64>>> {
+        let x = self.0.features.compute(pairs);
+        let network = self.0.network.clone().check()?;
+        let fits = network.cross_fits(&x, &values, folds)?;
+        let mut all = Vec::with_capacity(count);
+        for fold in 0..count {
+            all.push(match fits.iter().find(|fit| fit.label() == fold) {
+                Some(fit) => fit.predictions().to_owned(),
+                // A fold without rows leaves nothing out.
+                None => network.fit(&x, &values)?.predict(&x)?,
+            });
+        }
+        done(count);
+        Ok(all)
+    }
+}

@@ -1,0 +1,194 @@
+//! Networks and accumulators, as JSON and in binary.
+
+use elm::persist::{self, Persist};
+use elm::solve::{PseudoInverse, Ridge};
+use elm::{Accumulator, Activation, Biases, Elm, ElmParams, Neurons, Scalar};
+use ndarray::{Array1, Array2};
+
+use super::{Reader, Seed, read};
+
+pub(super) const MODEL: Reader = Reader {
+    name: "model",
+    seeds: models,
+    read: |bytes| any_precision(bytes, use_model::<f64>, use_model::<f32>),
+};
+
+pub(super) const ACCUMULATOR: Reader = Reader {
+    name: "accumulator",
+    seeds: accumulators,
+    read: |bytes| any_precision(bytes, use_accumulator::<f64>, use_accumulator::<f32>),
+};
+
+/// Reads as both precisions, and once more with the head of a binary file put right, without
+/// which the checksum would keep every mutation from the decoder.
+fn any_precision<T: Persist, U: Persist>(
+    bytes: &[u8],
+    one: impl Fn(&T),
+    other: impl Fn(&U),
+) -> bool {
+    let mended = mended(bytes);
+    let whole = check(bytes, &one) | check(bytes, &other);
+    if let Some(mended) = mended {
+        return whole | check(&mended, &one) | check(&mended, &other);
+    }
+    whole
+}
+
+fn check<T: Persist>(bytes: &[u8], then: impl Fn(&T)) -> bool {
+    let Some(value) = read(bytes, || persist::from_bytes::<T>(bytes)) else {
+        return false;
+    };
+    let binary = persist::to_bytes(&value).expect("what was read can be written");
+    let text = persist::to_json(&value).expect("what was read can be written");
+    for form in [&binary, text.as_bytes()] {
+        let again: T = persist::from_bytes(form).expect("what was written can be read");
+        assert!(
+            persist::to_bytes(&again).is_ok_and(|again| again == binary),
+            "another value"
+        );
+    }
+    then(&value);
+    true
+}
+
+/// The bytes with the length and the checksum that belong to their payload.
+fn mended(bytes: &[u8]) -> Option<Vec<u8>> {
+    let mut at = 8 + 4;
+    for _ in 0..2 {
+        at += 1 + usize::from(*bytes.get(at)?);
+    }
+    let payload = bytes.get(at + 12..)?;
+    let mut mended = bytes.get(..at)?.to_vec();
+    mended.extend((payload.len() as u64).to_le_bytes());
+    mended.extend(crc32fast::hash(payload).to_le_bytes());
+    mended.extend(payload);
+    Some(mended)
+}
+
+/// Some rows that a network of so many inputs might be given.
+fn rows<A: Scalar>(inputs: usize) -> Array2<A> {
+    Array2::from_shape_fn((3, inputs), |(row, input)| {
+        A::from_f64(row as f64 - 0.3 * input as f64)
+    })
+}
+
+fn use_model<A: Scalar>(model: &Elm<A>) {
+    // Wide enough for anything but a file that lies.
+    if model.inputs() > 1 << 12 {
+        return;
+    }
+    let x = rows::<A>(model.inputs());
+    if let Ok(y) = model.predict(&x) {
+        assert_eq!(y.dim(), (3, model.outputs()));
+        assert!(
+            y.iter().all(|value| value.is_finite()),
+            "a prediction that is no number: {y}"
+        );
+    }
+}
+
+fn use_accumulator<A: Scalar>(accumulator: &Accumulator<A>) {
+    let mut both = accumulator.clone();
+    both.merge(accumulator).ok();
+    for accumulator in [accumulator, &both] {
+        if let Ok(model) = accumulator.fit() {
+            assert!(model.beta().iter().all(|value| value.is_finite()));
+            let x = rows::<A>(model.inputs());
+            let t = Array2::<A>::ones((3, model.outputs()));
+            let mut more = accumulator.clone();
+            if more.push(&x, &t).is_ok() {
+                assert_eq!(more.rows(), accumulator.rows().saturating_add(3));
+                more.fit().ok();
+            }
+            use_model(&model);
+        }
+    }
+}
+
+fn data<A: Scalar>() -> (Array2<A>, Array1<A>) {
+    let x = Array2::from_shape_fn((8, 2), |(i, j)| {
+        A::from_f64(((i * (j + 2)) as f64 * 0.7).sin())
+    });
+    let t = x
+        .rows()
+        .into_iter()
+        .map(|row| row[0] * row[1] + row[0])
+        .collect();
+    (x, t)
+}
+
+fn seed<T: Persist>(name: &'static str, json: bool, value: &T) -> Seed {
+    let bytes = if json {
+        persist::to_json(value)
+            .expect("a built-in activation")
+            .into_bytes()
+    } else {
+        persist::to_bytes(value).expect("a built-in activation")
+    };
+    Seed { name, bytes }
+}
+
+fn models() -> Vec<Seed> {
+    fn fit<A: Scalar>(params: &ElmParams<A>) -> Elm<A> {
+        let (x, t) = data();
+        params.fit(&x, &t).expect("rows without a fault")
+    }
+    let plain = fit(&ElmParams::<f64>::new(3));
+    let linked = ElmParams::<f64>::new(2)
+        .solver(PseudoInverse::default())
+        .activation(Activation::Sine)
+        .biases(Biases::OnData)
+        .direct_links(true)
+        .standardise(false)
+        .intercept(false);
+    let mixed = ElmParams::<f64>::new(1)
+        .and(Neurons::new(1, Activation::Sine))
+        .and(Neurons::radial(2));
+    let single = fit(&ElmParams::<f32>::new(2).solver(Ridge::relative(1e-3)));
+    let mut broken = persist::to_bytes(&plain).expect("a built-in activation");
+    broken.truncate(broken.len() / 2);
+    vec![
+        seed("plain.json", true, &plain),
+        seed("plain.elm", false, &plain),
+        seed("linked.elm", false, &fit(&linked)),
+        seed("mixed.elm", false, &fit(&mixed)),
+        seed("mixed.json", true, &fit(&mixed)),
+        seed("single.json", true, &single),
+        seed("single.elm", false, &single),
+        Seed {
+            name: "bad-half.elm",
+            bytes: broken,
+        },
+    ]
+}
+
+fn accumulators() -> Vec<Seed> {
+    fn filled<A: Scalar>(params: ElmParams<A>, times: usize) -> Accumulator<A> {
+        let (x, t) = data();
+        let params = params.check().expect("parameters in range");
+        let mut accumulator =
+            Accumulator::from_sample(&params, &x, 1).expect("rows without a fault");
+        for _ in 0..times {
+            accumulator.push(&x, &t).expect("rows without a fault");
+        }
+        accumulator
+    }
+    let ridge = filled(ElmParams::<f64>::new(2).solver(Ridge::gcv()), 3);
+    vec![
+        seed("empty.elm", false, &filled(ElmParams::<f64>::new(1), 0)),
+        seed("ridge.json", true, &ridge),
+        seed("ridge.elm", false, &ridge),
+        seed(
+            "linked.elm",
+            false,
+            &filled(
+                ElmParams::<f64>::new(1)
+                    .solver(PseudoInverse::default())
+                    .direct_links(true)
+                    .intercept(false),
+                2,
+            ),
+        ),
+        seed("single.json", true, &filled(ElmParams::<f32>::new(1), 4)),
+    ]
+}

@@ -1,0 +1,134 @@
+//! 10-fold cross-validation of all materials from one factorisation, inputs scaled once, is
+//! refitting fold by fold.
+
+// The lint knows test functions, but not the helpers beside them.
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
+
+use std::path::PathBuf;
+
+use elm::solve::{PseudoInverse, Ridge, Solver};
+use elm::{Activation, ElmParams, Scaler};
+use elm_brdf::features::Features;
+use elm_brdf::geometry::pairs;
+use elm_brdf::link::Link;
+use elm_brdf::model::{BrdfParams, ScaledOnce};
+use elm_brdf::protocol::{Folds, cross_validate};
+use elm_datasets::{Invalid, MaterialId, Measurements, curet, synthetic};
+use ndarray::{Array2, ArrayView2, Axis, concatenate};
+
+fn all() -> Vec<MaterialId> {
+    MaterialId::all().collect()
+}
+
+/// CUReT's measurements, or `None` after saying that they are not there.
+fn real() -> Option<Measurements> {
+    let shared = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared");
+    let given = std::env::var_os("ELM_BRDF_DATA").map_or_else(|| shared.into(), PathBuf::from);
+    let folders = [given.join("curet"), given.clone()];
+    let found = folders.into_iter().find(|dir| curet::is_present(dir));
+    if found.is_none() {
+        eprintln!("skipped: no CUReT files in {}", given.display());
+    }
+    found.map(|dir| curet::read(&dir, &all(), Invalid::Clamp).unwrap())
+}
+
+fn scaled(x: &Array2<f64>) -> Array2<f64> {
+    let scaler = Scaler::measured(x).unwrap();
+    (x - &scaler.mean()) * scaler.factor()
+}
+
+fn largest(values: ArrayView2<'_, f64>) -> f64 {
+    values.iter().fold(0.0, |m, v| m.max(v.abs()))
+}
+
+fn one_factorisation_is_refitting(data: &Measurements) {
+    let x = Features::Paper.compute(&pairs(&data.directions));
+    let values: Vec<_> = data.materials.iter().map(|m| m.values.view()).collect();
+    let t = concatenate(Axis(1), &values).unwrap();
+    let folds = Folds::new(x.nrows(), 10, 1).unwrap();
+    let labels: Vec<usize> = (0..x.nrows()).map(|row| folds.of_row(row)).collect();
+    for solver in [
+        Solver::from(PseudoInverse::default()),
+        Ridge::relative(1e-9).into(),
+    ] {
+        let params = ElmParams::new(50).solver(solver).intercept(false).seed(1);
+        // All folds of all materials, from one call and one factorisation.
+        let fits = params
+            .clone()
+            .check()
+            .unwrap()
+            .cross_fits(&x, &t, &labels)
+            .unwrap();
+        assert_eq!(fits.len(), 10);
+
+        // The same network fold by fold: inputs are scaled already, by all rows. Strengths are
+        // relative to each fold's own matrix, so the absolute one is carried over.
+        let x = scaled(&x);
+        let refit = params.standardise(false);
+        let whole = refit.clone().fit(&x, &t).unwrap();
+        for fit in &fits {
+            let kept: Vec<usize> = (0..x.nrows())
+                .filter(|&r| labels[r] != fit.label())
+                .collect();
+            let (x_kept, t_kept) = (x.select(Axis(0), &kept), t.select(Axis(0), &kept));
+            let mut fold = refit.clone();
+            if let Solver::Ridge(_) = solver {
+                let of_fold = refit.fit(&x_kept, &t_kept).unwrap();
+                let size = |model: &elm::Elm<f64>| model.diagnosis().largest_singular_value;
+                let ratio = size(&whole) / size(&of_fold);
+                fold = fold.solver(Ridge::relative(1e-9 * ratio * ratio));
+            }
+            let truth = fold.fit(&x_kept, &t_kept).unwrap().predict(&x).unwrap();
+            let error = largest((&fit.predictions() - &truth).view());
+            let limit = 1e-9 * largest(t.view());
+            assert!(
+                error <= limit,
+                "{solver}, fold {}: {error:e} > {limit:e}",
+                fit.label()
+            );
+        }
+    }
+}
+
+#[test]
+fn where_nothing_is_scaled_scaling_once_is_scaling_in_each_fold() {
+    let data = synthetic::measurements(1, &all()[..5], Invalid::Clamp);
+    let folds = Folds::new(data.directions.len(), 10, 1).unwrap();
+    let params = BrdfParams {
+        features: Features::Paper,
+        link: Link::Identity,
+        // Well conditioned, so that the two routes have the same digits.
+        network: ElmParams::new(30)
+            .activation(Activation::Sine)
+            .scale(3.0)
+            .solver(PseudoInverse::default())
+            .standardise(false)
+            .intercept(false),
+    };
+    let each = cross_validate(&params, &data, &folds, |_, _| {}).unwrap();
+    let once = ScaledOnce::new(params).unwrap();
+    let mut calls = Vec::new();
+    let once = cross_validate(&once, &data, &folds, |done, all| calls.push((done, all))).unwrap();
+    assert_eq!(calls, [(10, 10)]);
+    for (a, b) in each.iter().zip(&once) {
+        let limit = 1e-9 * largest(a.predicted.view());
+        assert!(largest((&a.predicted - &b.predicted).view()) <= limit);
+        for (a, b) in a.channels.iter().zip(&b.channels) {
+            for (a, b) in [(&a.train, &b.train), (&a.held_out, &b.held_out)] {
+                assert!((a.rmse - b.rmse).abs() <= limit);
+            }
+        }
+    }
+}
+
+#[test]
+fn ten_folds_of_all_materials_of_the_stand_in_are_those_of_refitting() {
+    one_factorisation_is_refitting(&synthetic::measurements(1, &all(), Invalid::Clamp));
+}
+
+#[test]
+fn ten_folds_of_all_measured_materials_are_those_of_refitting() {
+    if let Some(data) = real() {
+        one_factorisation_is_refitting(&data);
+    }
+}
