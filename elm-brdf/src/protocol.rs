@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::brdf::{Brdf, Fit};
 use crate::error::{Error, Result};
 use crate::geometry::{self, Pair};
-use crate::metrics::{Metric, Metrics};
+use crate::metrics::Metrics;
 use crate::model::SideBySide;
 use crate::prior::{Prior, PriorParams};
 use crate::quality::{self, NoiseFloor};
@@ -227,7 +227,7 @@ impl Fit for ByChannel {
             .0
             .iter()
             .zip(columns)
-            .map(|(prior, column)| prior.fit_model(pairs, column, Metric::Rmse));
+            .map(|(prior, column)| prior.fit_model(pairs, column));
         Ok(Box::new(SideBySide(models.collect::<Result<_>>()?)))
     }
 }

@@ -37,7 +37,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NAME", conflicts_with = "prior",
           value_parser = one_of::<Features>(Features::ALL.map(Features::name)))]
     features: Option<Features>,
-    /// The held-out error that is made small.
+    /// The held-out error that is made small. With --prior it is the error of the logarithm,
+    /// whatever is said here.
     #[arg(long, value_name = "NAME", default_value = "rmse",
           value_parser = one_of::<Metric>(Metric::ALL.map(Metric::name)))]
     metric: Metric,
@@ -66,7 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let pairs = pairs(&samples.directions);
     let values = samples.values.view();
     let model = match prior {
-        Some(prior) => prior.fit_model(&pairs, values, arguments.metric)?,
+        Some(prior) => prior.fit_model(&pairs, values)?,
         None => Tuned {
             features: arguments.features,
             metric: arguments.metric,

@@ -2,8 +2,8 @@
 
 use elm::solve::{LeastSquares, Ridge};
 use elm::validate::Validator;
-use elm::{Elm, HiddenLayer, Scaler};
-use ndarray::{Array1, Array2, ArrayView2, Axis, concatenate};
+use elm::{Elm, ElmParams, HiddenLayer, Scaler};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, concatenate};
 
 use super::{Blank, Tuned, provenance, solve};
 use crate::error::{Error, Result};
@@ -11,7 +11,7 @@ use crate::features::Features;
 use crate::geometry::Pair;
 use crate::link::Link;
 use crate::metrics::{Metric, Metrics};
-use crate::model::{BrdfModel, Layer};
+use crate::model::{BrdfModel, Layer, Provenance};
 
 /// Neurons of a candidate.
 const NEURONS: usize = 400;
@@ -28,95 +28,131 @@ pub(super) fn fit(
     groups: &[Vec<usize>],
 ) -> Result<Vec<BrdfModel>> {
     let link = Link::default_log();
-    let fitted = link.fit(values)?;
-    let targets = fitted.to_targets(values)?;
-    let mut best: Vec<Option<Choice>> = vec![None; groups.len()];
-    for set in tuned.sets(&[Features::SumDifference]) {
-        let search = Search::new(tuned, set, pairs, &targets, groups)?;
-        for (group, best) in groups.iter().zip(&mut best) {
-            let choice = search.choose(tuned, set, pairs, values, &targets, group)?;
-            if best.as_ref().is_none_or(|best| choice.score < best.score) {
-                *best = Some(choice);
-            }
-        }
+    let targets = link.fit(values)?.to_targets(values)?;
+    let channels = groups.iter().map(Vec::len).max().unwrap_or(1);
+    let search = Search::new(tuned, pairs, &targets, channels)?;
+    let choose = |group: &Vec<usize>| search.choose(tuned, pairs, values, &targets, group);
+    let choices: Vec<Choice> = groups.iter().map(choose).collect::<Result<_>>()?;
+    // One factorisation of a candidate serves every group that has taken it.
+    let mut networks = Vec::new();
+    for candidate in 0..search.scales.nrows() {
+        let takes = |choice: &Choice| choice.members.contains(&candidate);
+        let taken = groups.iter().zip(&choices).filter(|(_, c)| takes(c));
+        let mut columns: Vec<usize> = taken.flat_map(|(group, _)| group.clone()).collect();
+        columns.sort_unstable();
+        columns.dedup();
+        networks.push(if columns.is_empty() {
+            None
+        } else {
+            Some(search.network(candidate, &targets, columns)?)
+        });
     }
     let about = provenance(tuned, pairs, values);
-    let models = groups.iter().zip(best).filter_map(|(group, choice)| {
-        let choice = choice?;
-        let model = choice.model(tuned, pairs, values, &targets, group);
-        Some(model.map(|model| {
-            let mut about = about.clone();
-            about.held_out = Some(choice.held_out);
-            model.with_provenance(about)
-        }))
-    });
-    models.collect()
+    let model = |(group, choice): (&Vec<usize>, Choice)| {
+        let link = link.fit(values.select(Axis(1), group).view())?;
+        let taken = choice.members.iter().filter_map(|&c| networks[c].as_ref());
+        let taken: Vec<&Network> = taken.collect();
+        let (layer, network) = average(&search.scaler, &taken, group)?;
+        let about = Provenance {
+            held_out: Some(choice.held_out),
+            ..about.clone()
+        };
+        Ok(BrdfModel::new(search.set, link, layer, network).with_provenance(about))
+    };
+    groups.iter().zip(choices).map(model).collect()
 }
 
 /// The networks that a group of channels is best fitted by.
-#[derive(Clone)]
 struct Choice {
-    set: Features,
-    /// Of the input scales.
-    members: Vec<Vec<f64>>,
-    neurons: usize,
-    score: f64,
+    /// Numbers of candidates.
+    members: Vec<usize>,
     held_out: Metrics,
 }
 
-/// All candidates of one set of inputs with what leave-one-out predicts.
+/// A candidate fitted to some of the channels.
+struct Network {
+    blank: Blank,
+    /// Which channels, in order.
+    columns: Vec<usize>,
+    beta: Array2<f64>,
+    intercept: Array1<f64>,
+}
+
+/// All candidates with what leave-one-out predicts.
 struct Search {
-    neurons: usize,
+    set: Features,
+    scaler: Scaler<f64>,
+    x: Array2<f64>,
+    /// Scales of inputs, shape (candidates, inputs).
     scales: Array2<f64>,
+    params: Vec<ElmParams<f64>>,
     /// For each candidate the residuals of targets, shape (rows, channels).
     left_out: Vec<Array2<f64>>,
     members: usize,
 }
 
 impl Search {
-    fn new(
-        tuned: &Tuned,
-        set: Features,
-        pairs: &[Pair],
-        targets: &Array2<f64>,
-        groups: &[Vec<usize>],
-    ) -> Result<Self> {
+    fn new(tuned: &Tuned, pairs: &[Pair], targets: &Array2<f64>, channels: usize) -> Result<Self> {
+        let set = tuned.features.unwrap_or(Features::SumDifference);
         let x = set.compute(pairs);
         let scaler = Scaler::measured(&x)?;
-        let channels = groups.iter().map(Vec::len).max().unwrap_or(1);
         let neurons = tuned.size(NEURONS, x.ncols(), channels, 2, |_| 0)?;
         let limited = tuned.neurons.is_some() || tuned.max_floats.is_some();
         let scales = spread(CANDIDATES, x.ncols());
-        let mut left_out = Vec::new();
-        for candidate in scales.rows() {
-            let blank = Blank::new(
-                tuned.waves(neurons, &candidate.to_vec()),
-                x.ncols(),
-                &scaler,
-            )?;
-            let h = blank.matrix(&x)?;
+        let params = |scales: ArrayView1<'_, f64>| tuned.waves(neurons, &scales.to_vec());
+        let mut search = Self {
+            set,
+            scaler,
+            x,
+            params: scales.rows().into_iter().map(params).collect(),
+            scales,
+            left_out: Vec::new(),
+            members: if limited { 1 } else { Tuned::MEMBERS },
+        };
+        for candidate in 0..CANDIDATES {
+            let (_, h) = search.layer(candidate)?;
             let validator = Validator::new(&LeastSquares::new(&h, targets)?.intercept(true))?;
             let lambda = validator.strengths(Ridge::leave_one_out())?;
-            let held_out = match validator.leave_one_out(&lambda) {
-                Ok(held_out) => held_out.residuals().to_owned(),
-                // One measurement: nothing can be left out of it.
-                Err(elm::Error::Undetermined { .. }) => targets.clone(),
-                Err(error) => return Err(error.into()),
-            };
-            left_out.push(held_out);
+            search
+                .left_out
+                .push(match validator.leave_one_out(&lambda) {
+                    Ok(held_out) => held_out.residuals().to_owned(),
+                    // One measurement: nothing can be left out of it.
+                    Err(elm::Error::Undetermined { .. }) => targets.clone(),
+                    Err(error) => return Err(error.into()),
+                });
         }
-        Ok(Self {
-            neurons,
-            scales,
-            left_out,
-            members: if limited { 1 } else { Tuned::MEMBERS },
+        Ok(search)
+    }
+
+    /// A candidate's layer and its matrix.
+    fn layer(&self, candidate: usize) -> Result<(Blank, Array2<f64>)> {
+        let params = self.params[candidate].clone();
+        let blank = Blank::new(params, self.x.ncols(), &self.scaler)?;
+        let h = blank.matrix(&self.x)?;
+        Ok((blank, h))
+    }
+
+    fn network(
+        &self,
+        candidate: usize,
+        targets: &Array2<f64>,
+        columns: Vec<usize>,
+    ) -> Result<Network> {
+        let (blank, h) = self.layer(candidate)?;
+        let targets = targets.select(Axis(1), &columns);
+        let (beta, intercept) = solve(&h, &targets, None, Ridge::leave_one_out())?;
+        Ok(Network {
+            blank,
+            columns,
+            beta,
+            intercept,
         })
     }
 
     fn choose(
         &self,
         tuned: &Tuned,
-        set: Features,
         pairs: &[Pair],
         values: ArrayView2<'_, f64>,
         targets: &Array2<f64>,
@@ -144,67 +180,46 @@ impl Search {
         }
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
         ranked.truncate(self.members);
-        let count = ranked.len() as f64;
+        let members: Vec<usize> = ranked.into_iter().map(|(_, candidate)| candidate).collect();
+        let share = 1.0 / members.len() as f64;
         let mut mean = Array2::zeros(targets.dim());
-        for &(_, candidate) in &ranked {
-            mean.scaled_add(
-                1.0 / count,
-                &self.left_out[candidate].select(Axis(1), group),
-            );
+        for &member in &members {
+            mean.scaled_add(share, &self.left_out[member].select(Axis(1), group));
         }
         let held_out = metrics(&mean)?;
-        Ok(Choice {
-            set,
-            members: ranked
-                .iter()
-                .map(|&(_, candidate)| self.scales.row(candidate).to_vec())
-                .collect(),
-            neurons: self.neurons,
-            score: score(&mean)?,
-            held_out,
-        })
+        Ok(Choice { members, held_out })
     }
 }
 
-impl Choice {
-    fn model(
-        &self,
-        tuned: &Tuned,
-        pairs: &[Pair],
-        values: ArrayView2<'_, f64>,
-        targets: &Array2<f64>,
-        group: &[usize],
-    ) -> Result<BrdfModel> {
-        let x = self.set.compute(pairs);
-        let scaler = Scaler::measured(&x)?;
-        let targets = targets.select(Axis(1), group);
-        let share = 1.0 / self.members.len() as f64;
-        let mut draws = Vec::new();
-        let (mut layers, mut betas) = (Vec::<HiddenLayer<f64>>::new(), Vec::new());
-        let mut intercept = Array1::zeros(group.len());
-        for scales in &self.members {
-            let blank = Blank::new(tuned.waves(self.neurons, scales), x.ncols(), &scaler)?;
-            let (beta, constant) =
-                solve(&blank.matrix(&x)?, &targets, None, Ridge::leave_one_out())?;
-            betas.push(beta * share);
-            intercept.scaled_add(share, &constant);
-            layers.push(blank.network.hidden().clone());
-            draws.push(blank.draw);
-        }
-        let views: Vec<_> = betas.iter().map(|beta| beta.view()).collect();
-        // All neurons are sines, so that they stand in the order of the layers.
-        let beta = concatenate(Axis(0), &views).map_err(|_| {
-            Error::Elm(elm::Error::Empty {
-                what: "networks",
-                rows: 0,
-                columns: group.len(),
-            })
-        })?;
-        let network =
-            Elm::from_parts(Some(scaler), HiddenLayer::joined(&layers)?, beta, intercept)?;
-        let link = Link::default_log().fit(values.select(Axis(1), group).view())?;
-        Ok(BrdfModel::new(self.set, link, Layer::Drawn(draws), network))
+/// One network, the mean of `networks`, for the channels of a group.
+fn average(
+    scaler: &Scaler<f64>,
+    networks: &[&Network],
+    group: &[usize],
+) -> Result<(Layer, Elm<f64>)> {
+    let share = 1.0 / networks.len() as f64;
+    let mut betas = Vec::new();
+    let mut intercept = Array1::zeros(group.len());
+    for network in networks {
+        let place = |channel: &usize| network.columns.iter().position(|c| c == channel);
+        let columns: Vec<usize> = group.iter().filter_map(place).collect();
+        betas.push(network.beta.select(Axis(1), &columns) * share);
+        intercept.scaled_add(share, &network.intercept.select(Axis(0), &columns));
     }
+    let views: Vec<_> = betas.iter().map(|beta| beta.view()).collect();
+    // All neurons are sines, so that they stand in the order of the layers.
+    let beta = concatenate(Axis(0), &views).map_err(|_| {
+        Error::Elm(elm::Error::Empty {
+            what: "networks",
+            rows: 0,
+            columns: group.len(),
+        })
+    })?;
+    let layers = networks.iter().map(|n| n.blank.network.hidden().clone());
+    let hidden = HiddenLayer::joined(&layers.collect::<Vec<_>>())?;
+    let draws = networks.iter().map(|n| n.blank.draw.clone()).collect();
+    let network = Elm::from_parts(Some(scaler.clone()), hidden, beta, intercept)?;
+    Ok((Layer::Drawn(draws), network))
 }
 
 /// Scales of inputs, shape (candidates, inputs): an additive recurrence, evenly spread in the
