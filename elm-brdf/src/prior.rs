@@ -39,7 +39,7 @@ use crate::model::{BrdfModel, Draw, Layer, SideBySide, without_weights};
 /// | name | default | purpose |
 /// |---|---|---|
 /// | `features` | [`Features::SumDifference`] | inputs |
-/// | `neurons` | 256 | size of the layer, and of every network fitted with the prior; more than directions, so that it follows each material |
+/// | `neurons` | 900 | size of the layer, and of every network fitted with the prior; several times the directions, so that it follows each material |
 /// | `seed` | 1 | the layer |
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PriorParams {
@@ -55,7 +55,7 @@ impl Default for PriorParams {
     fn default() -> Self {
         Self {
             features: Features::SumDifference,
-            neurons: 256,
+            neurons: 900,
             seed: 1,
         }
     }

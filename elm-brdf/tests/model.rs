@@ -170,8 +170,11 @@ fn models_come_back_from_files_of_both_forms_bit_for_bit() {
 #[test]
 fn stored_numbers_are_those_that_the_file_holds() {
     let [averaged, single, pruned, given, on_rows] = kinds().try_into().unwrap();
-    // Five times 400 weights and 4 scales; constant; 4 means and factors; offset and ceiling.
-    assert_eq!(averaged.stored_floats(), 5 * (400 + 4) + 1 + 8 + 2);
+    // Each member: 400 weights and 4 scales; constant; 4 means and factors; offset and ceiling.
+    assert_eq!(
+        averaged.stored_floats(),
+        Tuned::MEMBERS * (400 + 4) + 1 + 8 + 2
+    );
     assert_eq!(single.stored_floats(), 40 * 3 + 4 + 3 + 8 + 6);
     // 160 drawn, a bit each.
     let channels = pruned.channels();

@@ -5,7 +5,7 @@
 use elm::persist;
 use elm_brdf::brdf::Brdf;
 use elm_brdf::geometry::{self, Pair};
-use elm_brdf::metrics::{Metric, Metrics};
+use elm_brdf::metrics::Metrics;
 use elm_brdf::model::Tuned;
 use elm_brdf::prior::{Prior, PriorParams};
 use elm_datasets::{Invalid, MaterialId, synthetic};
@@ -49,7 +49,7 @@ fn with_a_prior_few_measurements_do_better_than_without() {
         let rows: Vec<usize> = (3..205).step_by(9).collect();
         let at: Vec<Pair> = rows.iter().map(|&row| pairs[row]).collect();
         let few = truth.select(Axis(0), &rows);
-        let taught = prior.fit_model(&at, few.view(), Metric::Rmse).unwrap();
+        let taught = prior.fit_model(&at, few.view()).unwrap();
         let alone = Tuned::default().fit_model(&at, few.view()).unwrap();
         with += rmse(&taught, &pairs, &truth).ln();
         without += rmse(&alone, &pairs, &truth).ln();
@@ -72,7 +72,7 @@ fn leaving_materials_out_is_building_without_them() {
     assert_eq!(left.materials(), 7);
     let few = values.slice(s![..60, 2..3]);
     let [one, other] = [built, left].map(|prior| {
-        let model = prior.fit_model(&pairs[..60], few, Metric::Rmse).unwrap();
+        let model = prior.fit_model(&pairs[..60], few).unwrap();
         model.eval(&pairs).unwrap()
     });
     approx::assert_abs_diff_eq!(one, other, epsilon = 1e-6);
@@ -84,16 +84,14 @@ fn what_is_fitted_with_a_prior_is_one_network_of_its_layer() {
     let (pairs, values) = materials(1..=6);
     let prior = small().build(&pairs, values.view()).unwrap();
     let two = values.slice(s![..40, ..2]);
-    let model = prior
-        .fit_model(&pairs[..40], two, Metric::CubeRoot)
-        .unwrap();
+    let model = prior.fit_model(&pairs[..40], two).unwrap();
     assert_eq!(model.network().hidden().neurons(), 90);
     assert_eq!(model.channels(), 2);
     // Weights, constant and link of each channel, four means and factors.
     assert_eq!(model.stored_floats(), 2 * (90 + 1 + 2) + 8);
     let at_once = model.eval(&pairs).unwrap();
     let alone = prior
-        .fit_model(&pairs[..40], values.slice(s![..40, 1..2]), Metric::CubeRoot)
+        .fit_model(&pairs[..40], values.slice(s![..40, 1..2]))
         .unwrap();
     let one = alone.eval(&pairs).unwrap();
     approx::assert_abs_diff_eq!(at_once.column(1), one.column(0), epsilon = 1e-9);
@@ -142,7 +140,7 @@ fn a_single_material_is_no_prior_and_a_single_measurement_is_enough_for_a_model(
     assert!(small().build(&pairs, values.slice(s![.., ..1])).is_err());
     let prior = small().build(&pairs, values.view()).unwrap();
     let one = prior
-        .fit_model(&pairs[..1], values.slice(s![..1, ..1]), Metric::Rmse)
+        .fit_model(&pairs[..1], values.slice(s![..1, ..1]))
         .unwrap();
     assert!(
         one.eval(&pairs)

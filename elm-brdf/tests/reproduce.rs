@@ -389,3 +389,48 @@ fn every_way_with_invalid_values_works_and_dropping_leaves_rows_out() {
     errors.dedup();
     assert_eq!(errors.len(), 3, "{errors:?}");
 }
+
+#[test]
+fn other_models_than_the_papers_come_beside_the_same_figures() {
+    let run = |model: &str, more: &[&str]| {
+        let arguments = ["reproduce", "--format", "json", "--model", model];
+        let report = json(&Program::new().output(&[&arguments, more].concat()));
+        check_schema(&report);
+        assert!(report["protocol"]["neurons"].is_null());
+        report
+    };
+    let two = ["--materials", "1,39", "--folds", "2"];
+    let best = run("best", &two);
+    assert_eq!(best["protocol"]["model"], "elm (prior)");
+    assert_eq!(best["materials"].as_array().unwrap().len(), 2);
+    let plane = run("lambert", &two);
+    assert!(plane["protocol"]["features"].is_null());
+    let error = |report: &Value| report["summary"]["mean_held_out_rmse"].as_f64().unwrap();
+    assert!(error(&best) < error(&plane));
+    let process = run("thin-plate (cosines, log)", &two);
+    assert_eq!(process["protocol"]["features"], "cosines");
+}
+
+#[test]
+fn what_no_other_model_has_or_is_named_like_is_said() {
+    let fails = |arguments: &[&str], words: &[&str]| {
+        let arguments = [&["reproduce"], arguments].concat();
+        let assert = Program::new().command().args(arguments).assert().code(2);
+        let message = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+        for word in words {
+            assert!(message.contains(word), "{message}");
+        }
+    };
+    fails(
+        &["--model", "best", "--neurons", "9"],
+        &["--neurons", "'best'"],
+    );
+    fails(
+        &["--model", "lmbert"],
+        &["lmbert", "paper, best, ", "lambert"],
+    );
+    fails(
+        &["--model", "gaussian-process"],
+        &["gaussian-process", "(cosines, log)"],
+    );
+}

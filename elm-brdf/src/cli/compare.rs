@@ -4,26 +4,17 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use elm::solve::{PseudoInverse, Ridge};
-use elm::{Activation, ElmParams};
 use elm_datasets::{Invalid, Measurements, Origin};
 use ndarray::{ArrayView2, Axis};
 
 use super::common::{hint, one_of, progress, usage};
 use super::data::Source;
 use super::samples::{Material, Reading};
-use super::{Failure, print};
+use super::{Failure, models, print};
 use crate::brdf::Fit;
-use crate::error::Error;
-use crate::features::Features;
 use crate::geometry::{Pair, pairs};
-use crate::link::Link;
-use crate::model::{BrdfParams, Tuned};
-use crate::prior::PriorParams;
-use crate::protocol::{
-    Folds, MaterialScores, cross_validate, cross_validate_pooled, cross_validate_samples,
-};
-use crate::reference::{self, Growth, Reference};
+use crate::protocol::{Folds, MaterialScores, cross_validate, cross_validate_samples};
+use crate::reference::Reference;
 use crate::report::plot::{self, Shown};
 use crate::report::{Comparison, Data, Entry, Format, Words};
 
@@ -76,7 +67,7 @@ enum Subject {
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
     let seeds: Vec<u64> = (arguments.seed..).take(arguments.seeds.into()).collect();
-    let names = select(&arguments.models, arguments.seed)?;
+    let names = models::select(&arguments.models, arguments.seed)?;
     let subject = match &arguments.samples {
         Some(name) => Subject::Samples(arguments.reading.read(name)?),
         None => {
@@ -96,7 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut entries = Vec::new();
     let mut best: Option<(f64, String, Vec<MaterialScores>)> = None;
     for (index, named) in names.iter().enumerate() {
-        if named.name == POOLED && matches!(subject, Subject::Samples(_)) {
+        if named.name == models::POOLED && matches!(subject, Subject::Samples(_)) {
             // One material has no others.
             progress.inc(seeds.len() as u64);
             continue;
@@ -104,11 +95,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let mut runs = Vec::new();
         let fitting = Instant::now();
         for &seed in &seeds {
-            let model = select(&arguments.models, seed)?
+            let model = models::select(&arguments.models, seed)?
                 .swap_remove(index)
                 .affordable(seed);
             let folds = Folds::new(subject.rows(), arguments.folds, seed).map_err(usage)?;
-            runs.push(if model.name == POOLED {
+            runs.push(if model.name == models::POOLED {
                 subject.pooled(seed, arguments.reading.invalid, &folds)?
             } else {
                 subject.cross_validate(model.method.as_ref(), &folds)?
@@ -175,18 +166,7 @@ impl Subject {
         let Self::Materials(source, data) = self else {
             return Ok(Vec::new());
         };
-        let pool = source.load(&source.select("all")?, invalid)?;
-        let params = PriorParams {
-            seed,
-            ..PriorParams::default()
-        };
-        Ok(cross_validate_pooled(
-            &params,
-            &pool,
-            data,
-            folds,
-            |_, _| {},
-        )?)
+        models::cross_validate_with_prior(source, data, invalid, seed, folds, |_, _| {})
     }
 
     fn data(&self, scores: &[MaterialScores]) -> Data {
@@ -271,94 +251,4 @@ impl Subject {
                 .collect(),
         }
     }
-}
-
-/// Everything chosen by held-out errors, each material by itself.
-const TUNED: &str = "elm (tuned)";
-/// The same with a prior from the other materials.
-const POOLED: &str = "elm (prior)";
-
-fn tuned(name: &str, seed: u64) -> Reference {
-    Reference {
-        name: name.to_owned(),
-        features: Some(Features::SumDifference),
-        link: Some(Link::default_log()),
-        growth: Growth::Linear,
-        network: true,
-        method: Box::new(Tuned {
-            seed,
-            ..Tuned::default()
-        }),
-    }
-}
-
-/// The models of these names, on all the inputs and targets that they come with.
-fn select(list: &str, seed: u64) -> Result<Vec<Reference>, Failure> {
-    let mut models: Vec<Reference> = reference::all().into_iter().chain(networks(seed)).collect();
-    if list.trim() == "all" {
-        return Ok(models);
-    }
-    let names: Vec<&str> = list.split(',').map(str::trim).collect();
-    if let Some(&unknown) = names
-        .iter()
-        .find(|&&name| models.iter().all(|model| model.name != name))
-    {
-        let mut known: Vec<String> = models.into_iter().map(|model| model.name).collect();
-        known.sort_unstable();
-        known.dedup();
-        return Err(usage(Error::UnknownName {
-            what: "model",
-            name: unknown.to_owned(),
-            expected: known.join(", "),
-        }));
-    }
-    models.retain(|model| names.contains(&model.name.as_str()));
-    Ok(models)
-}
-
-/// The paper's network, and the same idea with inputs, target and ridge that suit the task.
-fn networks(seed: u64) -> [Reference; 4] {
-    let network = |neurons: usize| ElmParams::new(neurons).seed(seed);
-    let reference = |name: &str, params: BrdfParams| Reference {
-        name: name.to_owned(),
-        features: Some(params.features),
-        link: Some(params.link),
-        growth: Growth::Linear,
-        network: true,
-        method: Box::new(params),
-    };
-    [
-        reference(
-            "elm (paper)",
-            BrdfParams {
-                features: Features::Paper,
-                link: Link::Identity,
-                // As 'reproduce' has it: eq. 7 and 11.
-                network: network(50)
-                    .activation(Activation::Sigmoid)
-                    .solver(PseudoInverse::default())
-                    .intercept(false),
-            },
-        ),
-        reference(
-            "elm (200 sine, ridge)",
-            BrdfParams {
-                features: Features::Cosines,
-                link: Link::default_log(),
-                network: network(200)
-                    .activation(Activation::Sine)
-                    .solver(Ridge::leave_one_out()),
-            },
-        ),
-        tuned(TUNED, seed),
-        // What is fitted to count its numbers: a network without the prior, of as many neurons.
-        Reference {
-            method: Box::new(Tuned {
-                neurons: Some(PriorParams::default().neurons),
-                seed,
-                ..Tuned::default()
-            }),
-            ..tuned(POOLED, seed)
-        },
-    ]
 }

@@ -10,6 +10,7 @@ mod export;
 mod fetch;
 mod fit;
 mod gallery;
+mod models;
 mod prior;
 mod render;
 mod reproduce;

@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use elm::solve::Solver;
+use elm::solve::{PseudoInverse, Solver};
 use elm::{Activation, ElmParams};
 use elm_datasets::{Invalid, Measurements};
 
 use super::common::{hint, one_of, progress, usage};
 use super::data::Source;
-use super::{Failure, print};
+use super::{Failure, models, print};
 use crate::brdf::Fit;
 use crate::features::Features;
 use crate::link::Link;
@@ -33,6 +33,11 @@ pub(super) struct Arguments {
     /// 'paper', 'all', or a list of numbers and names, such as '1,39,orange peel'.
     #[arg(long, value_name = "LIST", default_value = "paper")]
     materials: String,
+    /// 'paper': the network of the paper. 'best': the best that is known, 'elm (prior)', each
+    /// material with a prior from all others. Or any model that 'compare' knows. All but 'paper'
+    /// choose their settings in each fold by its training rows alone.
+    #[arg(long, value_name = "NAME", default_value = "paper")]
+    model: String,
     /// Number of folds, at least 2.
     #[arg(
         long,
@@ -53,28 +58,24 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1,
           value_parser = clap::value_parser!(u16).range(1..))]
     seeds: u16,
-    /// Hidden neurons, at least 1.
-    #[arg(
-        long,
-        value_name = "N",
-        allow_negative_numbers = true,
-        default_value_t = 50
-    )]
-    neurons: usize,
-    /// Activation function of the hidden neurons.
-    #[arg(long, value_name = "NAME", default_value = "sigmoid",
+    /// Hidden neurons of the paper's network, at least 1 [default: 50].
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    neurons: Option<usize>,
+    /// Activation function of the paper's network [default: sigmoid].
+    #[arg(long, value_name = "NAME",
           value_parser = one_of::<Activation<f64>>(Activation::<f64>::NAMES.split(", ")))]
-    activation: Activation<f64>,
-    /// Solver of the output weights: eq. 10 (needs as many neurons as training rows), eq. 11, or
-    /// ridge with its strength chosen by leave-one-out on the training rows.
-    #[arg(long, value_name = "NAME", default_value = "pseudo-inverse",
+    activation: Option<Activation<f64>>,
+    /// Solver of the output weights of the paper's network: eq. 10 (needs as many neurons as
+    /// training rows), eq. 11, or ridge with its strength chosen by leave-one-out on the training
+    /// rows [default: pseudo-inverse].
+    #[arg(long, value_name = "NAME",
           value_parser = one_of::<Solver>(Solver::NAMES.split(", ")))]
-    solver: Solver,
-    /// Which rows the inputs are scaled by: the training rows of each fold, or once all rows,
-    /// which takes a single factorisation for all folds (with the pseudo-inverse only). Held-out
-    /// directions then enter the scale; held-out values never do.
-    #[arg(long, value_enum, value_name = "WHEN", default_value_t = Scaling::Fold)]
-    scaling: Scaling,
+    solver: Option<Solver>,
+    /// Which rows the inputs of the paper's network are scaled by: the training rows of each fold,
+    /// or once all rows, which takes a single factorisation for all folds (with the pseudo-inverse
+    /// only). Held-out directions then enter the scale; held-out values never do [default: fold].
+    #[arg(long, value_enum, value_name = "WHEN")]
+    scaling: Option<Scaling>,
     /// Form of the output.
     #[arg(long, value_name = "FORM", default_value = "table",
           value_parser = one_of::<Format>(Format::ALL.map(Format::name)))]
@@ -98,38 +99,136 @@ enum Scaling {
     Once,
 }
 
-impl Scaling {
-    /// The name in reports.
-    fn name(self) -> &'static str {
-        match self {
-            Self::Fold => "fold",
-            Self::Once => "once",
+impl Arguments {
+    fn activation(&self) -> Activation<f64> {
+        self.activation.clone().unwrap_or(Activation::Sigmoid)
+    }
+
+    fn solver(&self) -> Solver {
+        self.solver.unwrap_or(PseudoInverse::default().into())
+    }
+}
+
+/// What is cross-validated.
+enum Model {
+    /// The paper's network, the same but for its seed, and whether it is scaled once.
+    Paper(Box<BrdfParams>, bool),
+    /// A model that chooses its own settings.
+    Named(String),
+    /// [`models::POOLED`].
+    WithPrior,
+}
+
+impl Model {
+    fn new(arguments: &Arguments) -> Result<Self, Failure> {
+        if arguments.model == "paper" {
+            return Self::paper(arguments);
         }
+        let given = [
+            ("--neurons", arguments.neurons.is_some()),
+            ("--activation", arguments.activation.is_some()),
+            ("--solver", arguments.solver.is_some()),
+            ("--scaling", arguments.scaling.is_some()),
+        ];
+        if let Some((name, _)) = given.into_iter().find(|(_, given)| *given) {
+            return Err(usage(format_args!(
+                "{name} is a setting of the paper's network, found --model '{}'",
+                arguments.model
+            )));
+        }
+        if arguments.model == "best" {
+            return Ok(Self::WithPrior);
+        }
+        let model = models::named(&arguments.model, arguments.seed)?;
+        Ok(if model.name == models::POOLED {
+            Self::WithPrior
+        } else {
+            Self::Named(model.full_name())
+        })
+    }
+
+    fn paper(arguments: &Arguments) -> Result<Self, Failure> {
+        let solver = arguments.solver();
+        let once = arguments.scaling == Some(Scaling::Once);
+        if once && !matches!(solver, Solver::PseudoInverse(_)) {
+            // Ridge's strength would be chosen on the held-out values too.
+            return Err(usage(format_args!(
+                "--scaling once needs --solver pseudo-inverse, found --solver {solver}"
+            )));
+        }
+        let params = BrdfParams {
+            features: Features::Paper,
+            link: Link::Identity,
+            network: ElmParams::new(arguments.neurons.unwrap_or(50))
+                .activation(arguments.activation())
+                .solver(solver)
+                // Equation 7 has no constant term.
+                .intercept(false)
+                .seed(arguments.seed),
+        };
+        params.network.clone().check().map_err(usage)?;
+        Ok(Self::Paper(Box::new(params), once))
+    }
+
+    fn protocol(&self, arguments: &Arguments) -> Result<Protocol, Failure> {
+        let mut protocol = Protocol {
+            model: arguments.model.clone(),
+            features: None,
+            target: None,
+            neurons: None,
+            activation: None,
+            solver: None,
+            scaling: None,
+            folds: arguments.folds,
+            seed: arguments.seed,
+            seeds: arguments.seeds.into(),
+        };
+        match self {
+            Self::Paper(params, once) => {
+                let scaling = if *once { "once" } else { "fold" };
+                protocol.features = Some(params.features.name().to_owned());
+                protocol.target = Some(params.link.name().to_owned());
+                protocol.neurons = Some(params.network.neurons());
+                protocol.activation = Some(arguments.activation().name().to_owned());
+                protocol.solver = Some(arguments.solver().name().to_owned());
+                protocol.scaling = Some(scaling.to_owned());
+            }
+            Self::Named(_) | Self::WithPrior => {
+                let name = match self {
+                    Self::Named(name) => name,
+                    _ => models::POOLED,
+                };
+                let model = models::named(name, arguments.seed)?;
+                protocol.features = model.features.map(|features| features.name().to_owned());
+                protocol.target = model.link.map(|link| link.name().to_owned());
+                protocol.model = model.name;
+            }
+        }
+        Ok(protocol)
+    }
+
+    /// The method of one seed; `None` where each material has its own.
+    fn method(&self, seed: u64) -> Result<Option<Box<dyn Fit>>, Failure> {
+        Ok(match self {
+            Self::Paper(params, once) => {
+                let mut params = (**params).clone();
+                params.network = params.network.seed(seed);
+                Some(if *once {
+                    Box::new(ScaledOnce::new(params)?)
+                } else {
+                    Box::new(params)
+                })
+            }
+            Self::Named(name) => Some(models::named(name, seed)?.method),
+            Self::WithPrior => None,
+        })
     }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
-    let params = |seed| BrdfParams {
-        features: Features::Paper,
-        link: Link::Identity,
-        network: ElmParams::new(arguments.neurons)
-            .activation(arguments.activation.clone())
-            .solver(arguments.solver)
-            // Equation 7 has no constant term.
-            .intercept(false)
-            .seed(seed),
-    };
-    let first = params(arguments.seed);
-    first.network.clone().check().map_err(usage)?;
-    let once = arguments.scaling == Scaling::Once;
-    if once && !matches!(arguments.solver, Solver::PseudoInverse(_)) {
-        // Ridge's strength would be chosen on the held-out values too.
-        return Err(usage(format_args!(
-            "--scaling once needs --solver pseudo-inverse, found --solver {}",
-            arguments.solver
-        )));
-    }
+    let model = Model::new(arguments)?;
+    let protocol = model.protocol(arguments)?;
 
     let source = Source::find(arguments.data.as_deref())?;
     let materials = source.select(&arguments.materials)?;
@@ -139,32 +238,29 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rows = data.directions.len();
     Folds::new(rows, arguments.folds, arguments.seed).map_err(usage)?;
     let seeds: Vec<u64> = (arguments.seed..).take(arguments.seeds.into()).collect();
-    let protocol = Protocol {
-        model: "paper".to_owned(),
-        features: first.features.name().to_owned(),
-        target: first.link.name().to_owned(),
-        neurons: arguments.neurons,
-        activation: arguments.activation.name().to_owned(),
-        solver: arguments.solver.name().to_owned(),
-        scaling: arguments.scaling.name().to_owned(),
-        folds: arguments.folds,
-        seed: arguments.seed,
-        seeds: seeds.len(),
-    };
     hint(&source);
-    let progress = progress("fold");
+    let progress = progress(match model {
+        Model::WithPrior => "material",
+        _ => "fold",
+    });
     let mut runs = Vec::new();
     for (index, &seed) in seeds.iter().enumerate() {
         let folds = Folds::new(rows, arguments.folds, seed).map_err(usage)?;
-        let method: Box<dyn Fit> = if once {
-            Box::new(ScaledOnce::new(params(seed))?)
-        } else {
-            Box::new(params(seed))
-        };
-        runs.push(cross_validate(&*method, &data, &folds, |done, all| {
+        let done = |done, all| {
             progress.set_length((all * seeds.len()) as u64);
             progress.set_position((all * index + done) as u64);
-        })?);
+        };
+        runs.push(match model.method(seed)? {
+            Some(method) => cross_validate(&*method, &data, &folds, done)?,
+            None => models::cross_validate_with_prior(
+                &source,
+                &data,
+                arguments.invalid,
+                seed,
+                &folds,
+                done,
+            )?,
+        });
     }
     progress.finish_and_clear();
 
@@ -176,7 +272,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let report = Report::new(source.describe(), &data, protocol, &runs, seconds);
     if let (Some(dir), Some(scores)) = (&arguments.plot, runs.first()) {
-        draw(dir, &report, &data, scores, &first)?;
+        let method = model.method(arguments.seed)?;
+        draw(dir, &report, &data, scores, method.as_deref())?;
     }
     if let Some(dir) = &arguments.out {
         report.write(dir)?;
@@ -184,26 +281,26 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     print(&report.render(arguments.format)?)
 }
 
-/// Pictures of the first seed's predictions, and lobes of a model of all measurements.
+/// Pictures of the first seed's predictions, and lobes of a model of all measurements where one
+/// method serves all materials.
 fn draw(
     dir: &Path,
     report: &Report,
     data: &Measurements,
     scores: &[MaterialScores],
-    method: &dyn Fit,
+    method: Option<&dyn Fit>,
 ) -> Result<(), Failure> {
     let protocol = &report.protocol;
     let title = format!(
-        "{}; {} model, {} {} neurons, {}, seed {}",
+        "{}; {}, seed {}",
         report.data.source,
-        protocol.model,
-        protocol.neurons,
-        protocol.activation,
-        protocol.solver,
+        protocol.describe(),
         protocol.seed,
     );
     plot::write(dir, &title, &Shown::of(data, scores))?;
-    let title = format!("{title}, fitted to all measurements");
-    plot::write_fitted_lobes(dir, &title, data, method)?;
+    if let Some(method) = method {
+        let title = format!("{title}, fitted to all measurements");
+        plot::write_fitted_lobes(dir, &title, data, method)?;
+    }
     Ok(())
 }

@@ -86,7 +86,7 @@ impl Tuned {
     /// With more measurements than this they count as many.
     pub const MANY: usize = 1500;
     /// Networks that are averaged for few measurements.
-    pub const MEMBERS: usize = 5;
+    pub const MEMBERS: usize = 6;
 
     /// Fits one network for all channels of `values` (BRDF in 1/sr, shape (pairs, channels)).
     ///

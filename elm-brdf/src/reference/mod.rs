@@ -67,6 +67,16 @@ pub struct Reference {
     pub method: Box<dyn Fit>,
 }
 
+/// A model's name with its inputs and target, where it has a choice of them.
+pub(crate) fn full_name(name: &str, features: Option<&str>, target: Option<&str>) -> String {
+    let details: Vec<&str> = [features, target].into_iter().flatten().collect();
+    if details.is_empty() {
+        name.to_owned()
+    } else {
+        format!("{name} ({})", details.join(", "))
+    }
+}
+
 /// How the cost of a fit grows with the number of measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Growth {
@@ -81,6 +91,13 @@ pub enum Growth {
 }
 
 impl Reference {
+    /// The model's name with its inputs and target, which tells those of one name apart.
+    #[must_use]
+    pub fn full_name(&self) -> String {
+        let features = self.features.map(Features::name);
+        full_name(&self.name, features, self.link.map(Link::name))
+    }
+
     /// With a limit to the measurements that the method is given, where its cost grows fast:
     /// a random subset of a file with many.
     #[must_use]

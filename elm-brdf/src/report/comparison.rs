@@ -9,6 +9,7 @@ use super::{Data, Format, json, mean, paper};
 use crate::error::{Error, Result};
 use crate::metrics::Metrics;
 use crate::protocol::{MaterialScores, Scores};
+use crate::reference::full_name;
 
 /// Models cross-validated on the same folds, the smallest held-out error first. Its JSON form is
 /// this structure, field for field.
@@ -156,15 +157,11 @@ impl Entry {
 
     /// The model with its inputs and target.
     fn full_name(&self) -> String {
-        let details: Vec<&str> = [&self.features, &self.target]
-            .into_iter()
-            .filter_map(Option::as_deref)
-            .collect();
-        if details.is_empty() {
-            self.model.clone()
-        } else {
-            format!("{} ({})", self.model, details.join(", "))
-        }
+        full_name(
+            &self.model,
+            self.features.as_deref(),
+            self.target.as_deref(),
+        )
     }
 }
 

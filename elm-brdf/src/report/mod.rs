@@ -66,25 +66,56 @@ pub struct Data {
 pub struct Protocol {
     /// The model's name.
     pub model: String,
-    /// The set of network inputs.
-    pub features: String,
-    /// The regression target.
-    pub target: String,
-    /// Hidden neurons.
-    pub neurons: usize,
+    /// The set of inputs; `None` for a model of the directions themselves.
+    pub features: Option<String>,
+    /// The regression target; `None` where there is no choice.
+    pub target: Option<String>,
+    /// Hidden neurons; like what follows only for the paper's network, as other models choose for
+    /// themselves.
+    pub neurons: Option<usize>,
     /// Activation function.
-    pub activation: String,
+    pub activation: Option<String>,
     /// Solver of the output weights.
-    pub solver: String,
+    pub solver: Option<String>,
     /// Which rows the network's inputs are scaled by: `fold`, the training rows of each fold, or
     /// `once`, all of them.
-    pub scaling: String,
+    pub scaling: Option<String>,
     /// Number of folds.
     pub folds: usize,
     /// Seed of the random layer and of the folds; the first where there are several.
     pub seed: u64,
     /// Number of seeds: this one and those that follow it. Figures are means over them.
     pub seeds: usize,
+}
+
+impl Protocol {
+    /// The model in a few words.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        let mut parts = Vec::new();
+        if let Some(features) = &self.features {
+            parts.push(format!("{features} inputs"));
+        }
+        if let Some(target) = &self.target {
+            parts.push(format!("{target} target"));
+        }
+        let mut text = self.model.clone();
+        if !parts.is_empty() {
+            text.push_str(&format!(" ({})", parts.join(", ")));
+        }
+        if let (Some(neurons), Some(activation)) = (self.neurons, &self.activation) {
+            text.push_str(&format!(", {neurons} {activation} neurons"));
+        }
+        if let Some(solver) = &self.solver {
+            text.push_str(&format!(", {solver}"));
+        }
+        match self.scaling.as_deref() {
+            Some("once") => text.push_str("; inputs scaled once, by all rows"),
+            Some(_) => text.push_str("; inputs scaled in each fold"),
+            None => {}
+        }
+        text
+    }
 }
 
 /// The figures of one material.

@@ -171,18 +171,8 @@ fn heading(out: &mut String, report: &Report, style: Style) {
     push(
         out,
         format_args!(
-            "{item}Model: {} ({} inputs, {} target), {} {} neurons, {}; inputs scaled {}; {}-fold \
-             cross-validation, {}\n",
-            protocol.model,
-            protocol.features,
-            protocol.target,
-            protocol.neurons,
-            protocol.activation,
-            protocol.solver,
-            match protocol.scaling.as_str() {
-                "once" => "once, by all rows",
-                _ => "in each fold",
-            },
+            "{item}Model: {}; {}-fold cross-validation, {}\n",
+            protocol.describe(),
             protocol.folds,
             seeds(protocol.seed, protocol.seeds),
         ),

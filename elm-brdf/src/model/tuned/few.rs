@@ -16,7 +16,7 @@ use crate::model::{BrdfModel, Layer, Provenance};
 /// Neurons of a candidate.
 const NEURONS: usize = 400;
 /// Candidates for the scales of inputs, per set of inputs.
-const CANDIDATES: usize = 32;
+const CANDIDATES: usize = 64;
 /// Scales tried, in units of the inputs' standard deviations: from nearly linear to several waves.
 const SCALES: (f64, f64) = (0.05, 3.3);
 
