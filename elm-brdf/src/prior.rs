@@ -19,6 +19,8 @@
 //! Targets are logarithms relative to each material's own median, so that a prior knows shapes, and
 //! brightness does not matter.
 
+mod design;
+
 use elm::persist::Persist;
 use elm::solve::{LeastSquares, Ridge, Solver};
 use elm::validate::Validator;
