@@ -81,8 +81,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         ..PriorParams::default()
     };
     let mut about = format!(
-        "{} materials of {}",
+        "{} material{} of {}",
         data.materials.len(),
+        if data.materials.len() == 1 { "" } else { "s" },
         source.describe()
     );
     if !left_out.is_empty() {
