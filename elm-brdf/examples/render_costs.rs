@@ -5,8 +5,8 @@
 //! cargo run --release -p elm-brdf --example render_costs -- [CURET_FOLDER]
 //! ```
 //!
-//! Times of growth are medians of three, those of savings single; without a folder the stand-in is
-//! used.
+//! Times of growth are medians of three, those of savings single, on one thread; without a folder
+//! the stand-in is used.
 
 // A program for a terminal.
 #![allow(clippy::print_stdout)]
@@ -27,7 +27,8 @@ fn main() -> Outcome<()> {
         network: Box::new(default_network),
     };
     growth(&library)?;
-    savings(&library)
+    savings(&library, None)?;
+    savings(&library, Some((320, 180)))
 }
 
 /// A render and the median of the seconds that so many of it took.
@@ -87,54 +88,65 @@ fn growth(library: &Library) -> Outcome<()> {
     for count in [1, 2, 8, 16] {
         row(&lights(count, 128, 128)?, count, options)?;
     }
-    let sheet = lights(4, 256, 256)?;
-    let one = row(&sheet, 4, options)?;
-    let two = row(
-        &sheet,
-        4,
-        Options {
-            threads: 2,
-            ..options
-        },
-    )?;
-    println!("two threads give {:.2} times one thread's speed", one / two);
+    threads(library)
+}
+
+/// One thread and two by turns, and the median of the ratios.
+fn threads(library: &Library) -> Outcome<()> {
+    let sheet = lights(4, 512, 512)?;
+    let with = |threads| -> Outcome<f64> {
+        let savings = Savings::LOSSLESS;
+        Ok(timed(1, &sheet, library, Options { savings, threads })?.1)
+    };
+    let mut gains = Vec::new();
+    for _ in 0..7 {
+        gains.push(with(1)? / with(2)?);
+    }
+    gains.sort_by(f64::total_cmp);
+    println!(
+        "two threads give {:.2} times one thread's speed ({:.2} to {:.2} in seven runs)",
+        gains[3], gains[0], gains[6]
+    );
     Ok(())
 }
 
-fn savings(library: &Library) -> Outcome<()> {
-    println!("\nscene           evaluations     time  mean steps  most steps");
+/// Brute force against all savings on every built-in scene, at its own size or about another.
+fn savings(library: &Library, size: Option<(u32, u32)>) -> Outcome<()> {
+    println!("\nscene               size  evaluations     time  mean steps  most steps  lossless");
     let (mut evaluations, mut times, mut count) = (0.0, 0.0, 0.0);
     for name in BUILTIN_NAMES {
         let mut sheet = builtin(name, None)?;
-        // Large enough that edges, whose samples never stop early, do not rule.
-        sheet.resize(960, 600);
+        if let Some((width, height)) = size {
+            sheet.resize(width, height);
+        }
         let with = |savings| {
-            timed(
-                1,
-                &sheet,
-                library,
-                Options {
-                    savings,
-                    threads: 1,
-                },
-            )
+            let threads = 1;
+            timed(1, &sheet, library, Options { savings, threads })
         };
         let (brute, slow) = with(Savings::NONE)?;
         let (saved, fast) = with(Savings::ALL)?;
+        let (lossless, _) = with(Savings::LOSSLESS)?;
+        let same = match lossless.pixels == brute.pixels {
+            true => "same bits",
+            false => "DIFFERS",
+        };
         let fewer = brute.account.done.evaluations as f64 / saved.account.done.evaluations as f64;
         let faster = slow / fast;
         let (a, b) = (Bitmap::display(&brute), Bitmap::display(&saved));
         let steps = a.bytes().iter().zip(b.bytes()).map(|(a, b)| a.abs_diff(*b));
         let most = steps.clone().max().unwrap_or(0);
         let mean = steps.map(f64::from).sum::<f64>() / a.bytes().len() as f64;
-        println!("{name:<15} {fewer:>10.2}x {faster:>7.2}x {mean:>11.3} {most:>11}");
+        let size = format!("{}x{}", brute.width, brute.height);
+        println!(
+            "{name:<14} {size:>9} {fewer:>11.2}x {faster:>7.2}x {mean:>11.4} {most:>11}  {same}"
+        );
         evaluations += fewer.ln();
         times += faster.ln();
         count += 1.0;
     }
     let mean = |sum: f64| (sum / count).exp();
     println!(
-        "geometric mean  {:>10.2}x {:>7.2}x",
+        "geometric mean           {:>11.2}x {:>7.2}x",
         mean(evaluations),
         mean(times)
     );

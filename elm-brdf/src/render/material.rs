@@ -37,6 +37,8 @@ pub struct Material {
     ceiling: f64,
     proxy: Proxy,
     albedo: f64,
+    /// Factor that keeps the albedo from passing 1; 1 where that was not asked for or needed.
+    scale: f64,
     economy: Option<Economy>,
 }
 
@@ -87,6 +89,7 @@ impl Material {
             ceiling: CEILING_MARGIN * highest,
             proxy,
             albedo: largest_albedo,
+            scale,
             economy: None,
         })
     }
@@ -152,7 +155,8 @@ impl Material {
     /// reflected, for each of some angles (theta_o, albedo).
     #[must_use]
     pub fn albedo(&self) -> Vec<(f64, f64)> {
-        self.proxy.albedo().collect()
+        let scaled = |(theta_o, albedo)| (theta_o, self.scale * albedo);
+        self.proxy.albedo().map(scaled).collect()
     }
 
     /// The largest directional albedo of any channel before any rescaling; above 1 the model
@@ -160,6 +164,12 @@ impl Material {
     #[must_use]
     pub fn largest_albedo(&self) -> f64 {
         self.albedo
+    }
+
+    /// Whether it was scaled down so that no albedo passes 1.
+    #[must_use]
+    pub fn is_rescaled(&self) -> bool {
+        self.scale < 1.0
     }
 
     /// No value of [`eval`](Self::eval) is larger, channel by channel.

@@ -4,7 +4,8 @@ use super::account::Account;
 use super::error::SceneError;
 use super::scene::Scene;
 use super::supply::Supply;
-use super::{Options, Rendering, render_within};
+use super::together::{self, Difference};
+use super::{Options, Rendering};
 use crate::error::Result;
 
 /// Pictures of one size in rows and columns, rendered as one picture.
@@ -83,47 +84,83 @@ impl Sheet {
     ///
     /// # Errors
     /// As [`render`](super::render); [`SceneError::Sheet`] for panels of different sizes, and for a difference
-    /// from a panel that does not come before it.
+    /// from a panel that is no scene before it.
     pub fn render(
         &self,
         supply: &dyn Supply,
         options: Options,
         progress: &(dyn Fn(u64, u64) + Sync),
     ) -> Result<Rendering> {
-        let count = self.panels.len() as u64;
-        let mut done: Vec<Rendering> = Vec::with_capacity(self.panels.len());
-        for (index, panel) in self.panels.iter().enumerate() {
-            let rendering = match &panel.content {
-                Content::Scene(scene) => {
-                    render_within(scene, supply, options, self.steps(index), &|part, whole| {
-                        // Panels of one size take about as long as each other.
-                        progress(index as u64 * whole + part, count * whole);
-                    })?
-                }
-                Content::Difference { of, from, factor } => {
-                    match (done.get(*of), done.get(*from)) {
-                        (Some(a), Some(b)) if a.pixels.len() == b.pixels.len() => {
-                            difference(a, b, *factor)
-                        }
-                        _ => return Err(SceneError::Sheet { panel: index }.into()),
-                    }
-                }
-            };
-            done.push(rendering);
+        let groups = self.groups()?;
+        let count = groups
+            .iter()
+            .map(|group| group.scenes.len() as u64)
+            .sum::<u64>();
+        let mut done: Vec<Option<Rendering>> = vec![None; self.panels.len()];
+        let mut before = 0;
+        for Group {
+            scenes,
+            differences,
+        } in groups
+        {
+            let here = scenes.len() as u64;
+            let (places, scenes): (Vec<usize>, Vec<&Scene>) = scenes.into_iter().unzip();
+            let renderings =
+                together::render(&scenes, &differences, supply, options, &|part, whole| {
+                    // Panels of one size take about as long as each other.
+                    let each = whole / here;
+                    progress(before * each + part, count * each);
+                })?;
+            for (place, rendering) in places.into_iter().zip(renderings) {
+                done[place] = Some(rendering);
+            }
+            before += here;
         }
+        for (index, panel) in self.panels.iter().enumerate() {
+            if let Content::Difference { of, from, factor } = panel.content {
+                // Groups were made of what there is.
+                let panels = (done.get(of), done.get(from));
+                let (Some(Some(a)), Some(Some(b))) = panels else {
+                    return Err(SceneError::Sheet { panel: index }.into());
+                };
+                done[index] = Some(difference(a, b, factor));
+            }
+        }
+        let done: Vec<Rendering> = done.into_iter().flatten().collect();
         Ok(self.compose(&done)?)
     }
 
-    /// The bound on a panel's errors in display steps: as much smaller as a difference enlarges
-    /// them.
-    fn steps(&self, panel: usize) -> f64 {
-        let factors = self.panels.iter().filter_map(|other| match other.content {
-            Content::Difference { of, from, factor } => {
-                (of == panel || from == panel).then_some(factor.abs())
+    /// The scenes by panel, those together whose differences are shown.
+    fn groups(&self) -> Result<Vec<Group<'_>>, SceneError> {
+        let mut groups: Vec<Group<'_>> = Vec::new();
+        for (index, panel) in self.panels.iter().enumerate() {
+            match &panel.content {
+                Content::Scene(scene) => groups.push(Group {
+                    scenes: vec![(index, scene)],
+                    differences: Vec::new(),
+                }),
+                Content::Difference { of, from, factor } => {
+                    let group = |panel: &usize| {
+                        let holds = |group: &Group<'_>| group.scenes.iter().any(|s| s.0 == *panel);
+                        let sheet = SceneError::Sheet { panel: index };
+                        groups.iter().position(holds).ok_or(sheet)
+                    };
+                    let (a, b) = (group(of)?, group(from)?);
+                    if a != b {
+                        let other = groups.remove(a.max(b));
+                        groups[a.min(b)].append(other);
+                    }
+                    let group = &mut groups[a.min(b)];
+                    let place = |panel: &usize| group.scenes.iter().position(|s| s.0 == *panel);
+                    // Both are in it now.
+                    if let (Some(of), Some(from)) = (place(of), place(from)) {
+                        let factor = *factor;
+                        group.differences.push(Difference { of, from, factor });
+                    }
+                }
             }
-            Content::Scene(_) => None,
-        });
-        0.5 / factors.fold(1.0, f64::max)
+        }
+        Ok(groups)
     }
 
     fn compose(&self, panels: &[Rendering]) -> Result<Rendering, SceneError> {
@@ -183,6 +220,25 @@ impl Sheet {
             origins,
             account,
         })
+    }
+}
+
+/// Scenes that are rendered together, with the panels that they fill.
+struct Group<'a> {
+    scenes: Vec<(usize, &'a Scene)>,
+    differences: Vec<Difference>,
+}
+
+impl Group<'_> {
+    fn append(&mut self, other: Self) {
+        let first = self.scenes.len();
+        self.scenes.extend(other.scenes);
+        let moved = other.differences.into_iter().map(|difference| Difference {
+            of: first + difference.of,
+            from: first + difference.from,
+            ..difference
+        });
+        self.differences.extend(moved);
     }
 }
 

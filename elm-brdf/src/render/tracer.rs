@@ -18,6 +18,9 @@ const ROULETTE_FROM: u32 = 3;
 /// away from the viewer.
 const LEAST_COSINE: f64 = 1e-3;
 
+/// Signatures up to here are of rays that met no surface.
+const MISSED: u64 = 1;
+
 /// Everything that the paths of a picture share.
 pub(crate) struct Tracer<'a> {
     pub(crate) world: &'a World,
@@ -42,15 +45,20 @@ pub(crate) struct Tracer<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sample {
     pub(crate) pixel: u32,
+    /// Where in the pixel, from 0 to 1 on both axes.
+    pub(crate) place: [f64; 2],
     pub(crate) radiance: Rgb,
     /// The shape that was met and the lights without extent that reach it, as a hash; equal where
     /// no edge lies between.
     pub(crate) signature: u64,
+    /// Whether chance chose more than the place in the pixel: a point on a light, or a direction.
+    pub(crate) drawn: bool,
 }
 
 /// A path on its way.
 struct Path {
     pixel: u32,
+    place: [f64; 2],
     seed: u32,
     sample: u32,
     ray: Ray,
@@ -177,12 +185,19 @@ impl Tracer<'_> {
             for path in &paths {
                 sink(Sample {
                     pixel: path.pixel,
+                    place: path.place,
                     radiance: path.radiance,
                     signature: path.signature,
+                    drawn: self.draws() && path.signature > MISSED,
                 });
             }
         }
         Ok(())
+    }
+
+    /// Whether anything is drawn at a surface.
+    fn draws(&self) -> bool {
+        self.world.has_extended_lights || self.depth > 1
     }
 
     /// A path from the camera up to what it meets first.
@@ -199,8 +214,10 @@ impl Tracer<'_> {
             .ray(f64::from(column) + x, f64::from(row) + y);
         let hit = self.world.intersect(&ray);
         let (radiance, state, signature) = match hit {
-            Hit::Reflector { object, .. } => (BLACK, State::Arrived, u64::from(object) + 2),
-            Hit::Emitter { radiance, .. } => (radiance, State::Ended, 1),
+            Hit::Reflector { object, .. } => {
+                (BLACK, State::Arrived, u64::from(object) + MISSED + 1)
+            }
+            Hit::Emitter { radiance, .. } => (radiance, State::Ended, MISSED),
             Hit::Nothing => {
                 let sky = self.world.environment().filter(|(_, sky)| sky.visible);
                 let radiance = sky.map_or(BLACK, |(_, sky)| sky.radiance(ray.direction));
@@ -209,6 +226,7 @@ impl Tracer<'_> {
         };
         Path {
             pixel,
+            place: [x, y],
             seed,
             sample,
             ray,
@@ -403,14 +421,22 @@ impl Tracer<'_> {
             }
             State::FoundLight(scaled(radiance, power_heuristic(density, light_density)))
         };
+        let sky = || match self.world.environment() {
+            Some((_, sky)) => {
+                let light_density = sky.density(vertex.frame.normal, ray.direction);
+                found(sky.radiance(ray.direction), light_density)
+            }
+            None => State::Ended,
+        };
+        if surface + 1 >= self.depth && !self.world.has_area_lights {
+            // Nothing but the sky counts, and what hides it need not be known.
+            return match self.world.blocked(&ray, f64::INFINITY) {
+                true => State::Ended,
+                false => sky(),
+            };
+        }
         match self.world.intersect(&ray) {
-            Hit::Nothing => match self.world.environment() {
-                Some((_, sky)) => {
-                    let light_density = sky.density(vertex.frame.normal, ray.direction);
-                    found(sky.radiance(ray.direction), light_density)
-                }
-                None => State::Ended,
-            },
+            Hit::Nothing => sky(),
             Hit::Emitter {
                 radiance,
                 light,

@@ -25,6 +25,8 @@ pub(crate) struct World {
     pub(crate) materials: Vec<String>,
     /// Whether directions drawn from a material can find a light.
     pub(crate) has_extended_lights: bool,
+    /// Whether some of these are forms that a ray can meet.
+    pub(crate) has_area_lights: bool,
     hierarchy: Hierarchy,
     /// What each form belongs to.
     surfaces: Vec<Surface>,
@@ -83,6 +85,7 @@ impl World {
             .position(|l| matches!(l, Light::Environment(_)));
         Ok(Self {
             camera: Camera::new(scene)?,
+            has_area_lights: builder.lights.iter().any(|l| matches!(l, Light::Area(_))),
             has_extended_lights: builder.lights.iter().any(Light::has_extent),
             lights: builder.lights,
             materials: builder.materials,

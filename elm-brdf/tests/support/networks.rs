@@ -1,0 +1,25 @@
+//! Networks small enough for tests.
+
+use std::path::PathBuf;
+
+use elm::{Activation, ElmParams, solve::Ridge};
+use elm_brdf::features::Features;
+use elm_brdf::link::Link;
+use elm_brdf::model::BrdfParams;
+use elm_brdf::render::Library;
+
+/// Fitted to CUReT's files in this folder, or to the stand-in.
+pub(crate) fn library(curet: Option<PathBuf>) -> Library {
+    Library {
+        curet,
+        network: Box::new(|_, _| {
+            Box::new(BrdfParams {
+                features: Features::ReciprocalCosines,
+                link: Link::default_log(),
+                network: ElmParams::new(40)
+                    .activation(Activation::Tanh)
+                    .solver(Ridge::leave_one_out()),
+            })
+        }),
+    }
+}
