@@ -30,6 +30,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod batch;
 pub mod brdf;
 pub mod cli;
 mod error;
