@@ -109,9 +109,11 @@ fn a_network_without_angles_is_the_network_with_angles() {
     let values = network.eval(&directions).unwrap();
     for (pair, values) in directions.iter().zip(values.rows()) {
         for (value, expected) in values.iter().zip(by_angles(&weights, pair)) {
-            // Single precision, through three layers of some ten terms of the order of 1.
+            // Rounding a direction to 6e-8 turns a half vector whose part in the plane is no
+            // shorter than 1e-2, as here, by 6e-6; the layers of weights up to 0.6 magnify that
+            // by some 3 each at most.
             assert!(
-                (value - expected).abs() < 2e-5 * (1.0 + expected),
+                (value - expected).abs() < 1.5e-4 * (1.0 + expected),
                 "{pair:?}"
             );
         }

@@ -10,6 +10,7 @@ mod export;
 mod fetch;
 mod fit;
 mod gallery;
+mod pareto;
 mod prior;
 mod render;
 mod reproduce;
@@ -35,6 +36,7 @@ struct Arguments {
 enum Command {
     Reproduce(reproduce::Arguments),
     Compare(compare::Arguments),
+    Pareto(pareto::Arguments),
     Fit(fit::Arguments),
     Eval(eval::Arguments),
     Prior(prior::Arguments),
@@ -82,6 +84,7 @@ pub fn run() -> ExitCode {
             Command::Export(arguments) => export::run(&arguments),
             Command::Gallery(arguments) => gallery::run(&arguments),
             Command::Compare(arguments) => compare::run(&arguments),
+            Command::Pareto(arguments) => pareto::run(&arguments),
             #[cfg(feature = "fetch")]
             Command::Fetch(arguments) => fetch::run(&arguments),
         },
