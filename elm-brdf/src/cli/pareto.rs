@@ -132,8 +132,9 @@ fn candidates(arguments: &Arguments, metric: Metric) -> Result<Vec<pareto::Candi
     let mut all = pareto::all(metric, arguments.seed);
     if let Some(list) = &arguments.models {
         let parts: Vec<&str> = list.split(',').map(str::trim).collect();
-        let known = |part: &&&str| !all.iter().any(|candidate| candidate.name.contains(**part));
-        if let Some(unknown) = parts.iter().find(known) {
+        let is_unknown =
+            |part: &&&str| !all.iter().any(|candidate| candidate.name.contains(**part));
+        if let Some(unknown) = parts.iter().find(is_unknown) {
             let names: Vec<&str> = all
                 .iter()
                 .map(|candidate| candidate.name.as_str())

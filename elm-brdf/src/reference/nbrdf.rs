@@ -181,10 +181,11 @@ impl Kernel<f32> for Nbrdf {
         self.output.run::<S, false>(simd, two, &mut x[..CHANNELS]);
         let (iz, oz) = (directions[2], directions[5]);
         for (x, out) in x.iter().zip(out) {
-            for r in 0..ROWS {
-                let value = f32::exponential(x.0[r]) - 1.0;
-                let above = iz[r] > 0.0 && oz[r] > 0.0;
-                out.0[r] = if above { value.max(0.0) } else { 0.0 };
+            let directions = iz.iter().zip(oz);
+            for ((out, x), (&iz, &oz)) in out.0.iter_mut().zip(&x.0).zip(directions) {
+                let value = f32::exponential(*x) - 1.0;
+                let above = iz > 0.0 && oz > 0.0;
+                *out = if above { value.max(0.0) } else { 0.0 };
             }
         }
     }

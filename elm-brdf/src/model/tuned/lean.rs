@@ -33,7 +33,8 @@ use crate::model::{BrdfModel, Layer};
 ///
 /// The target is the log. The scales of weights and biases are those, of six pairs, whose network
 /// has the least error on rows that it was not fitted to, of 1500 to fit and 1500 to judge at most;
-/// then the output weights are fitted to all rows.
+/// then the output weights are fitted to all rows, by a ridge whose strength leave-one-out chooses
+/// where there are few ([`Tuned::MANY`](super::Tuned::MANY)).
 ///
 /// ```
 /// use elm_brdf::{batch::Packed, geometry::pairs, model::Lean};
@@ -106,6 +107,7 @@ impl Lean {
             lean: self,
             scaler: &scaler,
             link: &link,
+            ridge: ridge(pairs.len()),
             x: x.select(Axis(0), fitted),
             targets: targets.select(Axis(0), fitted),
             weights: row_weights(
@@ -137,7 +139,7 @@ impl Lean {
         };
         let h = blank.matrix(&x)?;
         let weights = row_weights(self.metric, pairs, values, &link);
-        let (beta, intercept) = solve(&h, &targets, weights.as_ref(), Ridge::relative(RIDGE))?;
+        let (beta, intercept) = solve(&h, &targets, weights.as_ref(), ridge(pairs.len()))?;
         let hidden = blank.network.hidden().clone();
         let network = Elm::from_parts(Some(scaler.clone()), hidden, beta, intercept)?;
         let tuned = super::Tuned {
@@ -158,6 +160,16 @@ impl Fit for Lean {
     }
 }
 
+/// Of many measurements the noise averages out; of few, leave-one-out says how strong a ridge it
+/// takes.
+fn ridge(rows: usize) -> Ridge {
+    if rows > super::Tuned::MANY {
+        Ridge::relative(RIDGE)
+    } else {
+        Ridge::leave_one_out()
+    }
+}
+
 fn select(pairs: &[Pair], rows: &[usize]) -> Vec<Pair> {
     rows.iter().map(|&row| pairs[row]).collect()
 }
@@ -166,6 +178,7 @@ struct Search<'a> {
     lean: &'a Lean,
     scaler: &'a Scaler<f64>,
     link: &'a FittedLink,
+    ridge: Ridge,
     x: Array2<f64>,
     targets: Array2<f64>,
     weights: Option<ndarray::Array1<f64>>,
@@ -190,7 +203,7 @@ impl Search<'_> {
             .distribution(Distribution::Normal)
             .scale(scale)
             .biases(Biases::Scaled(bias))
-            .solver(Ridge::relative(RIDGE))
+            .solver(self.ridge)
             .seed(self.lean.seed);
         let mut blank = Blank::new(params.clone(), 0, self.scaler)?;
         if drawn > neurons {
@@ -204,8 +217,7 @@ impl Search<'_> {
             blank.network = without_weights(self.scaler, hidden)?;
         }
         let h = blank.matrix(&self.x)?;
-        let ridge = Ridge::relative(RIDGE);
-        let (beta, constant) = solve(&h, &self.targets, self.weights.as_ref(), ridge)?;
+        let (beta, constant) = solve(&h, &self.targets, self.weights.as_ref(), self.ridge)?;
         let predicted = self
             .link
             .to_values(blank.matrix(&judge.x)?.dot(&beta) + &constant)?;
