@@ -2,6 +2,7 @@
 
 use ndarray::{Array2, ArrayView2, Axis};
 
+use crate::batch::Precision;
 use crate::error::{Error, Result};
 use crate::geometry::Pair;
 use crate::model::BrdfModel;
@@ -27,6 +28,17 @@ pub trait Brdf: Send + Sync {
     /// Numbers that must be stored to evaluate one channel, the largest where channels differ:
     /// coefficients, scales and measurements kept, but nothing that a seed regenerates.
     fn floats_per_channel(&self) -> usize;
+
+    /// Numbers that must be stored to evaluate all channels: those of each, unless the model knows
+    /// what its channels share.
+    fn stored_floats(&self) -> usize {
+        self.channels() * self.floats_per_channel()
+    }
+
+    /// The same model for [directions in columns](crate::batch), where it is packed for them.
+    fn by_columns(&self) -> Option<Precision<'_>> {
+        None
+    }
 
     /// The model itself where it is a network, for what only a network can do, such as
     /// [being exported](crate::export).

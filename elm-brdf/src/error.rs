@@ -28,6 +28,14 @@ pub enum Error {
         /// What is wrong with it.
         reason: elm::persist::Error,
     },
+    /// The weights of a network trained elsewhere could not be read.
+    #[error("{}: {reason}", path.display())]
+    Weights {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// Files could not be fetched.
     #[cfg(feature = "fetch")]
     #[error(transparent)]

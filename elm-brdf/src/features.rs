@@ -38,17 +38,22 @@ pub enum Features {
     /// $\cos\theta_i + \cos\theta_o$: the root spreads out the angles where a mirror-like
     /// highlight changes fast. Reciprocal.
     Highlight,
+    /// $\sqrt{\sin\theta_h}$, $\cos^2\theta_d$ and $\cos\theta_i \cos\theta_o$: the same in three
+    /// numbers, which is as many as a reciprocal isotropic material depends on, and from directions by
+    /// arithmetic and two square roots. Reciprocal.
+    Algebraic,
 }
 
 impl Features {
     /// Every set there is.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Paper,
         Self::HalfDiff,
         Self::Cosines,
         Self::SumDifference,
         Self::ReciprocalCosines,
         Self::Highlight,
+        Self::Algebraic,
     ];
 
     /// The set's name.
@@ -61,6 +66,7 @@ impl Features {
             Self::SumDifference => "sum-difference",
             Self::ReciprocalCosines => "reciprocal-cosines",
             Self::Highlight => "highlight",
+            Self::Algebraic => "algebraic",
         }
     }
 
@@ -102,6 +108,11 @@ impl Features {
                 "cos theta_i cos theta_o",
                 "cos theta_i + cos theta_o",
             ],
+            Self::Algebraic => &[
+                "sqrt sin theta_h",
+                "cos^2 theta_d",
+                "cos theta_i cos theta_o",
+            ],
         }
     }
 
@@ -133,6 +144,7 @@ impl Features {
                 Self::SumDifference => fill(row, &sum_difference(pair)),
                 Self::ReciprocalCosines => fill(row, &reciprocal_cosines(pair)),
                 Self::Highlight => fill(row, &highlight(pair)),
+                Self::Algebraic => fill(row, &algebraic(pair)),
             }
         }
         out
@@ -192,6 +204,16 @@ fn highlight(pair: &Pair) -> [f64; 4] {
         angles.cos_theta_d(),
         cos_i * cos_o,
         cos_i + cos_o,
+    ]
+}
+
+fn algebraic(pair: &Pair) -> [f64; 3] {
+    let angles = pair.half_difference();
+    let cosine = angles.cos_theta_d();
+    [
+        angles.sin_theta_h().sqrt(),
+        cosine * cosine,
+        pair.incident[2] * pair.outgoing[2],
     ]
 }
 
@@ -295,7 +317,8 @@ mod tests {
                 // Rounding of the azimuths moves the half vector by 1e-15 / cos(theta_d), and
                 // the root of an angle by the root of that at most.
                 let moved = 4e-15 / original.half_difference().cos_theta_d();
-                let tolerance = if set == Features::Highlight { moved.sqrt() } else { moved };
+                let has_root = matches!(set, Features::Highlight | Features::Algebraic);
+                let tolerance = if has_root { moved.sqrt() } else { moved };
                 for other in [pair(turn, 1.0), pair(turn, -1.0)] {
                     let other = set.compute(&[other]);
                     prop_assert!(x.iter().zip(&other).all(|(a, b)| (a - b).abs() <= tolerance));

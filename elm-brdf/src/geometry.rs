@@ -140,6 +140,16 @@ impl HalfDifference {
         }
     }
 
+    /// $\sin\theta_h$.
+    #[must_use]
+    pub fn sin_theta_h(&self) -> f64 {
+        if self.sum > 0.0 {
+            self.across / self.sum
+        } else {
+            0.0
+        }
+    }
+
     /// $\cos\theta_d$.
     #[must_use]
     pub fn cos_theta_d(&self) -> f64 {

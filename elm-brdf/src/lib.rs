@@ -30,6 +30,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod batch;
 pub mod brdf;
 pub mod cli;
 mod error;
@@ -43,6 +44,7 @@ pub mod geometry;
 pub mod link;
 pub mod metrics;
 pub mod model;
+pub mod pareto;
 pub mod prior;
 pub mod protocol;
 pub mod published;

@@ -220,11 +220,12 @@ fn bounds(model: &BrdfModel, pairs: &[Pair]) -> Vec<Option<[f64; 3]>> {
                     return None;
                 }
                 let value = activation.apply(z);
-                // All are Lipschitz with constant 1 but the step. The sine reduces z first.
-                let lipschitz = if *activation == Activation::HardLimit {
-                    0.0
-                } else {
-                    z_error
+                // All are Lipschitz with constant 1 but the step, and the square, whose slope is 2z.
+                // The sine reduces z first.
+                let lipschitz = match activation {
+                    Activation::HardLimit => 0.0,
+                    Activation::SquaredRelu => z_error * (2.0 * z.abs() + z_error),
+                    _ => z_error,
                 };
                 term(
                     k,

@@ -11,6 +11,7 @@ mod fetch;
 mod fit;
 mod gallery;
 mod models;
+mod pareto;
 mod prior;
 mod render;
 mod reproduce;
@@ -36,6 +37,7 @@ struct Arguments {
 enum Command {
     Reproduce(reproduce::Arguments),
     Compare(compare::Arguments),
+    Pareto(pareto::Arguments),
     Fit(fit::Arguments),
     Eval(eval::Arguments),
     Prior(prior::Arguments),
@@ -83,6 +85,7 @@ pub fn run() -> ExitCode {
             Command::Export(arguments) => export::run(&arguments),
             Command::Gallery(arguments) => gallery::run(&arguments),
             Command::Compare(arguments) => compare::run(&arguments),
+            Command::Pareto(arguments) => pareto::run(&arguments),
             #[cfg(feature = "fetch")]
             Command::Fetch(arguments) => fetch::run(&arguments),
         },

@@ -65,6 +65,11 @@ const FUNCTIONS: &[Function] = &[
         result: "0.5 * (z + abs(z))",
     },
     Function {
+        name: "squared-relu",
+        lines: &[("r", "0.5 * (z + abs(z))")],
+        result: "r * r",
+    },
+    Function {
         name: "hard-limit",
         // The inner sign is 0 at 0, where the function is 1.
         lines: &[],

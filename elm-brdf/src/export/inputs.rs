@@ -25,11 +25,16 @@ const INPUTS: &[(&str, &str)] = &[
     ("sin theta_e", "sqrt(ox * ox + oy * oy)"),
     ("theta_h", "theta_h"),
     ("sqrt theta_h", "sqrt(theta_h)"),
+    ("sqrt sin theta_h", "sqrt(across / sum)"),
     ("cos theta_h", "sz / sum"),
     ("theta_d", "theta_d"),
     (
         "cos theta_d",
         "sum / sqrt(sum * sum + difference * difference)",
+    ),
+    (
+        "cos^2 theta_d",
+        "sum * sum / (sum * sum + difference * difference)",
     ),
     ("cos theta_i + cos theta_o", "sz"),
     ("cos theta_o - cos theta_i", "oz - iz"),

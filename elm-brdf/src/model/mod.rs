@@ -28,7 +28,7 @@ use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
 pub use layer::{Draw, Layer};
 pub use scaled_once::ScaledOnce;
-pub use tuned::Tuned;
+pub use tuned::{Lean, Tuned};
 pub(crate) use tuned::{SideBySide, without_weights};
 
 /// What a [`BrdfModel`] is made of.
@@ -215,6 +215,10 @@ impl Brdf for BrdfModel {
             }
         }
         Ok(values)
+    }
+
+    fn stored_floats(&self) -> usize {
+        BrdfModel::stored_floats(self)
     }
 
     fn as_network(&self) -> Option<&BrdfModel> {

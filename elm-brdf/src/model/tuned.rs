@@ -1,6 +1,7 @@
 //! A reflectance model whose settings are chosen by held-out errors.
 
 mod few;
+mod lean;
 mod many;
 
 use elm::solve::{LeastSquares, Ridge, Solver};
@@ -14,6 +15,7 @@ use crate::features::Features;
 use crate::geometry::Pair;
 use crate::metrics::Metric;
 use crate::quality;
+pub use lean::Lean;
 
 /// Fits a network and chooses what is left open: inputs, the scale of each input, regularisation,
 /// and, of many neurons drawn, which to keep.

@@ -8,8 +8,9 @@
 //! | [`Neighbours`]: nearest, inverse distance | inputs | the measurements |
 //! | [`RadialBasis`]: thin plate, cubic | inputs, smoothness | the measurements |
 //! | [`GaussianProcess`] | inputs, smoothness of each | the measurements |
+//! | [`Nbrdf`]: a published network, read from its weights | half and difference vectors | 675 for three channels |
 //!
-//! Every one implements [`Fit`], treats each channel by itself (so none pools materials), shares
+//! Every one but the last implements [`Fit`], treats each channel by itself (so none pools materials), shares
 //! factorisations between channels, and returns a [`Brdf`](crate::brdf::Brdf) that is finite, not
 //! negative, and 0 where light or viewer is at or below the horizon.
 //!
@@ -33,6 +34,7 @@ mod gaussian_process;
 mod inputs;
 mod kernel;
 mod koenderink;
+mod nbrdf;
 mod neighbours;
 mod radial;
 mod thinned;
@@ -42,6 +44,7 @@ use elm::solve::Ridge;
 pub use analytic::{Analytic, AnalyticModel, Shape};
 pub use gaussian_process::{Covariance, GaussianProcess};
 pub use koenderink::Koenderink;
+pub use nbrdf::Nbrdf;
 pub use neighbours::Neighbours;
 pub use radial::{Radial, RadialBasis, Smoothing};
 use thinned::Thinned;

@@ -38,6 +38,7 @@ mod formula {
         Gaussian is gaussian;
         GaussianFast is gaussian_fast;
         Relu is relu;
+        SquaredRelu is squared_relu;
         HardLimit is hard_limit;
         Isru is isru;
     }
@@ -82,6 +83,7 @@ impl<A: Scalar> WithSimd for Apply<'_, A> {
             }
             (Activation::Gaussian, _) => map::<S, A, formula::Gaussian>(simd, values),
             (Activation::Relu, _) => map::<S, A, formula::Relu>(simd, values),
+            (Activation::SquaredRelu, _) => map::<S, A, formula::SquaredRelu>(simd, values),
             (Activation::HardLimit, _) => map::<S, A, formula::HardLimit>(simd, values),
             (Activation::Isru, _) => map::<S, A, formula::Isru>(simd, values),
             (Activation::Linear | Activation::Custom(_), _) => {}

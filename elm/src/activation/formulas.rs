@@ -115,6 +115,13 @@ pub(super) fn relu<S: Simd, A: Coefficients>(z: Lanes<S, A>) -> Lanes<S, A> {
     z.where_less(A::ZERO, z.constant(A::ZERO), z)
 }
 
+/// $\max(0, z)^2$.
+#[inline(always)]
+pub(super) fn squared_relu<S: Simd, A: Coefficients>(z: Lanes<S, A>) -> Lanes<S, A> {
+    let rectified = relu(z);
+    rectified * rectified
+}
+
 /// 1 where $z \ge 0$, else 0.
 #[inline(always)]
 pub(super) fn hard_limit<S: Simd, A: Coefficients>(z: Lanes<S, A>) -> Lanes<S, A> {

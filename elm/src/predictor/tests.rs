@@ -40,7 +40,7 @@ fn plain(model: &Elm<f64>, x: &Array2<f64>) -> (Array2<f64>, Array2<f64>) {
         .map_or_else(|| x.clone(), |s| s.transform(x.view()));
     let hidden = model.hidden();
     let mut z = x.dot(&hidden.weights()) + hidden.biases();
-    // The slope of no function here exceeds 1.
+    // The slope of no function here exceeds 1, but for the squared ReLU's.
     let mut z_size =
         x.mapv(f64::abs).dot(&hidden.weights().mapv(f64::abs)) + hidden.biases().mapv(f64::abs);
     let mut neuron = 0;
@@ -54,6 +54,12 @@ fn plain(model: &Elm<f64>, x: &Array2<f64>) -> (Array2<f64>, Array2<f64>) {
                     // Inputs and centres are rounded before their difference.
                     z_size[[i, k]] = z[[i, k]] + row.dot(&row).sqrt();
                 }
+            }
+            if *group.activation() == Activation::SquaredRelu {
+                let slope = z.column(k).mapv(|z| 2.0 * z.abs());
+                z_size
+                    .column_mut(k)
+                    .zip_mut_with(&slope, |size, s| *size *= s);
             }
             z.column_mut(k)
                 .mapv_inplace(|z| group.activation().apply(z));

@@ -25,7 +25,7 @@ const PRUNE_ROWS: usize = 1500;
 /// Neurons of the search.
 const SEARCH_NEURONS: usize = 96;
 /// Weak, but strong enough for the normal equations.
-const RIDGE: f64 = 3e-8;
+pub(super) const RIDGE: f64 = 3e-8;
 /// A scale is moved by this factor, then by its root.
 const STEPS: [f64; 2] = [2.0, 1.414];
 /// Where every scale begins.
@@ -87,7 +87,7 @@ pub(super) fn fit(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) ->
 /// absolute errors that the metric asks for. `None` for metrics that targets serve as they are: the
 /// cube root, which is near to them, and RMSE, of which a few bright rows would leave nothing to the
 /// others.
-fn row_weights(
+pub(super) fn row_weights(
     metric: Metric,
     pairs: &[Pair],
     values: ArrayView2<'_, f64>,

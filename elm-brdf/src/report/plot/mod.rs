@@ -5,6 +5,7 @@
 //! | `predicted-against-measured` | every held-out prediction over its measurement |
 //! | `error-by-angle` | root mean squared error in steps of 10 degrees |
 //! | `error-by-material` | each material's error beside the paper's and the noise floor |
+//! | `pareto` | error over time per evaluation, with the front |
 //! | `lobes` | reflectance in the plane of incidence, measurements on the model's curves |
 //!
 //! Colours are those of M. Okabe and K. Ito, *Color Universal Design*, 2008, which the colour
@@ -12,6 +13,7 @@
 
 mod angle;
 mod bars;
+mod front;
 mod lobes;
 mod scatter;
 
@@ -33,6 +35,7 @@ use super::{mean, paper, replace};
 use crate::brdf::{Brdf, Fit};
 use crate::error::{Error, Result};
 use crate::geometry::{self, Pair};
+use crate::pareto::Point;
 use crate::protocol::MaterialScores;
 
 pub(super) const BLUE: RGBColor = RGBColor(0, 114, 178);
@@ -123,6 +126,15 @@ pub fn write(dir: &Path, title: &str, materials: &[Shown<'_>]) -> Result<Vec<Pat
     let bars = bars::Bars::new(title, materials);
     files.extend(save(&bars, dir, "error-by-material")?);
     Ok(files)
+}
+
+/// Draws the error of models over their time per evaluation, as `pareto`, into `dir`, which is made
+/// if need be, and returns the files.
+///
+/// # Errors
+/// [`Error::Write`] naming the file or folder.
+pub fn write_front(dir: &Path, title: &str, error: &str, points: &[Point]) -> Result<Vec<PathBuf>> {
+    save(&front::Front::new(title, error, points), dir, "pareto")
 }
 
 /// One panel of [`write_lobes`]: a material as a fitted model has it.

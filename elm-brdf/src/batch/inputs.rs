@@ -1,0 +1,116 @@
+//! The networks' inputs from columns of directions. Plain loops over a block, which the compiler
+//! turns into vector code; only the sets that have an angle for an input take arc tangents.
+
+use super::real::Real;
+use super::{Block, ROWS};
+use crate::features::Features;
+
+/// Fills a block for each input of the set. The same as
+/// [`Features::compute`](crate::features::Features::compute) but for rounding.
+#[inline(always)]
+pub(super) fn compute<A: Real>(set: Features, d: &[&[A; ROWS]; 6], x: &mut [Block<A>]) {
+    match (set, x) {
+        (Features::Paper, [a, b, c, d0, e, f, ..]) => {
+            for r in 0..ROWS {
+                let [ix, iy, iz, ox, oy, oz] = d.map(|part| part[r]);
+                a.0[r] = iz;
+                b.0[r] = oz * iz - ox * ix - oy * iy;
+                c.0[r] = iz;
+                d0.0[r] = (ix * ix + iy * iy).sqrt();
+                e.0[r] = oz;
+                f.0[r] = (ox * ox + oy * oy).sqrt();
+            }
+        }
+        (Features::HalfDiff, [a, b, c, e, f, ..]) => {
+            for r in 0..ROWS {
+                let [ix, iy, iz, ox, oy, oz] = d.map(|part| part[r]);
+                let s = Sum::of(d, r);
+                a.0[r] = s.across.sqrt().atan2(s.along);
+                b.0[r] = s.difference.sqrt().atan2(s.length.sqrt());
+                c.0[r] = s.along;
+                e.0[r] = iz * oz;
+                f.0[r] = ix * ox + iy * oy;
+            }
+        }
+        (
+            Features::Cosines | Features::SumDifference | Features::ReciprocalCosines,
+            [a, b, c, e, ..],
+        ) => {
+            for r in 0..ROWS {
+                let (iz, oz) = (d[2][r], d[5][r]);
+                let s = Sum::of(d, r);
+                a.0[r] = s.cos_theta_h();
+                b.0[r] = s.cos_theta_d();
+                (c.0[r], e.0[r]) = match set {
+                    Features::Cosines => (iz, oz),
+                    Features::SumDifference => (s.along, oz - iz),
+                    _ => (s.along, iz * oz),
+                };
+            }
+        }
+        (Features::Highlight, [a, b, c, e, ..]) => {
+            for r in 0..ROWS {
+                let s = Sum::of(d, r);
+                a.0[r] = s.across.sqrt().atan2(s.along).sqrt();
+                b.0[r] = s.cos_theta_d();
+                c.0[r] = d[2][r] * d[5][r];
+                e.0[r] = s.along;
+            }
+        }
+        (Features::Algebraic, [a, b, c, ..]) => {
+            for r in 0..ROWS {
+                let s = Sum::of(d, r);
+                // Not 0 / 0 where the two are opposite.
+                let square = s.across / s.length.max(A::min_positive_value());
+                a.0[r] = square.sqrt().sqrt();
+                b.0[r] = s.length * A::from_f64(0.25);
+                c.0[r] = d[2][r] * d[5][r];
+            }
+        }
+        // No set has fewer inputs than its arm above takes.
+        _ => {}
+    }
+}
+
+/// The sum of light and viewer, and how far apart they are.
+struct Sum<A> {
+    /// Component along the normal.
+    along: A,
+    /// The square of the part in the plane of the surface.
+    across: A,
+    /// The square of the whole.
+    length: A,
+    /// The square of the difference.
+    difference: A,
+}
+
+impl<A: Real> Sum<A> {
+    #[inline(always)]
+    fn of(d: &[&[A; ROWS]; 6], r: usize) -> Self {
+        let [ix, iy, iz, ox, oy, oz] = d.map(|part| part[r]);
+        let (sx, sy, sz) = (ix + ox, iy + oy, iz + oz);
+        let (dx, dy, dz) = (ix - ox, iy - oy, iz - oz);
+        let across = sx * sx + sy * sy;
+        Self {
+            along: sz,
+            across,
+            length: across + sz * sz,
+            difference: dx * dx + dy * dy + dz * dz,
+        }
+    }
+
+    #[inline(always)]
+    fn cos_theta_h(&self) -> A {
+        if self.length > A::zero() {
+            self.along / self.length.sqrt()
+        } else {
+            A::one()
+        }
+    }
+
+    #[inline(always)]
+    fn cos_theta_d(&self) -> A {
+        // Of unit vectors: the two squares add up to 4.
+        (self.length / (self.length + self.difference)).sqrt()
+    }
+}

@@ -1,0 +1,321 @@
+//! A network of this project, packed for evaluation by columns.
+
+use elm::{Activation, Kind};
+use ndarray::Array2;
+use pulp::Simd;
+
+use super::dense::{Dense, Fused, MOST_INPUTS, Rectified, SquaredRectified};
+use super::real::Real;
+use super::{Batched, Block, Columns, Kernel, Precision, ROWS, eval_pairs, inputs, run};
+use crate::brdf::Brdf;
+use crate::error::{Error, Result};
+use crate::features::Features;
+use crate::geometry::Pair;
+use crate::link::Channel;
+use crate::model::BrdfModel;
+
+/// A [`BrdfModel`] packed for [evaluation by columns](crate::batch) in `f32` or `f64`.
+///
+/// In `f64` it agrees with [`BrdfModel::eval`](Brdf::eval) but for rounding; in `f32` as far as
+/// single precision goes, which for the output weights of an ill-conditioned fit is not far.
+///
+/// Cheapest are networks of up to six inputs whose neurons are [`Activation::Relu`] or
+/// [`Activation::SquaredRelu`] all: those never leave the registers.
+#[derive(Debug, Clone)]
+pub struct Packed<A: Real> {
+    features: Features,
+    neurons: usize,
+    layers: Layers<A>,
+    links: Vec<Link<A>>,
+    floats: usize,
+    floats_per_channel: usize,
+}
+
+#[derive(Debug, Clone)]
+enum Layers<A: Real> {
+    /// Three outputs each.
+    Rectified(Vec<Fused<A>>),
+    SquaredRectified(Vec<Fused<A>>),
+    /// Functions by how many neurons have them.
+    Any {
+        hidden: Dense<A>,
+        functions: Vec<(usize, Activation<A>)>,
+        output: Dense<A>,
+    },
+}
+
+/// [`Channel`] in the precision of the evaluation.
+#[derive(Debug, Clone, Copy)]
+enum Link<A> {
+    Identity,
+    Log { offset: A, ceiling: A },
+    CubeRoot { ceiling: A },
+}
+
+impl<A: Real> Packed<A> {
+    /// Packs a model.
+    ///
+    /// # Errors
+    /// [`elm::Error::Conflict`] for a network with radial neurons, direct links or a function of
+    /// the user's own.
+    pub fn new(model: &BrdfModel) -> Result<Self> {
+        let refused = |first| {
+            Err(Error::Elm(elm::Error::Conflict {
+                first,
+                second: "evaluation by columns",
+            }))
+        };
+        let network = model.network();
+        let (layer, beta) = (network.hidden(), network.beta());
+        if layer
+            .groups()
+            .iter()
+            .any(|group| group.kind() != Kind::Projection)
+        {
+            return refused("radial neurons");
+        }
+        if beta.nrows() != layer.neurons() {
+            return refused("direct links");
+        }
+        let mut functions = Vec::new();
+        for group in layer.groups() {
+            let Ok(function) = group.activation().name().parse::<Activation<A>>() else {
+                return refused("a function of the user's own");
+            };
+            functions.push((group.neurons(), function));
+        }
+
+        // The scaling of inputs, folded in.
+        let (inputs, outputs) = (network.inputs(), network.outputs());
+        let mut weights: Array2<f64> = layer.weights().to_owned();
+        let mut biases = layer.biases().to_owned();
+        if let Some(scaler) = network.scaler() {
+            for (mut row, &factor) in weights.rows_mut().into_iter().zip(scaler.factor()) {
+                row *= factor;
+            }
+            biases -= &scaler.mean().dot(&weights);
+        }
+
+        let intercept = network.intercept();
+        let output = |neuron: usize, output: usize| beta.get((neuron, output)).copied();
+        let fused = || -> Vec<Fused<A>> {
+            let triple = |first: usize| {
+                let three = |of: &dyn Fn(usize) -> Option<f64>| {
+                    [first, first + 1, first + 2].map(|number| of(number).unwrap_or(0.0))
+                };
+                let neurons = (0..layer.neurons()).map(|k| {
+                    let beta = three(&|number| output(k, number));
+                    (biases[k], weights.column(k).to_vec(), beta)
+                });
+                Fused::new(
+                    inputs,
+                    three(&|number| intercept.get(number).copied()),
+                    neurons,
+                )
+            };
+            (0..outputs).step_by(3).map(triple).collect()
+        };
+        let all = |function: Activation<A>| functions.iter().all(|(_, other)| *other == function);
+        let layers = if inputs <= MOST_INPUTS && all(Activation::Relu) {
+            Layers::Rectified(fused())
+        } else if inputs <= MOST_INPUTS && all(Activation::SquaredRelu) {
+            Layers::SquaredRectified(fused())
+        } else {
+            Layers::Any {
+                hidden: Dense::new(
+                    inputs,
+                    layer.neurons(),
+                    |input, neuron| weights[[input, neuron]],
+                    |neuron| biases[neuron],
+                ),
+                functions,
+                output: Dense::new(
+                    layer.neurons(),
+                    outputs,
+                    |neuron, output| beta[[neuron, output]],
+                    |output| intercept[output],
+                ),
+            }
+        };
+        Ok(Self {
+            features: model.features(),
+            neurons: layer.neurons(),
+            layers,
+            links: model.link().by_channel().iter().map(Link::new).collect(),
+            floats: model.stored_floats(),
+            floats_per_channel: model.floats_per_channel(),
+        })
+    }
+
+    /// Number of hidden neurons.
+    #[must_use]
+    pub fn neurons(&self) -> usize {
+        self.neurons
+    }
+
+    fn inputs(&self) -> usize {
+        self.features.inputs().len()
+    }
+
+    /// Blocks that the network's outputs take, in threes.
+    fn outputs(&self) -> usize {
+        self.links.len().next_multiple_of(3)
+    }
+}
+
+impl<A: Real> Link<A> {
+    fn new(channel: &Channel) -> Self {
+        // A ceiling beyond the range of single precision is none.
+        let ceiling = |ceiling: f64| A::from_f64(ceiling).min(A::max_value());
+        match *channel {
+            Channel::Identity => Self::Identity,
+            Channel::Log { offset, ceiling: c } => Self::Log {
+                offset: A::from_f64(offset),
+                ceiling: ceiling(c),
+            },
+            Channel::CubeRoot { ceiling: c } => Self::CubeRoot {
+                ceiling: ceiling(c),
+            },
+        }
+    }
+
+    /// Values of a block from targets; 0 where a direction is not above the horizon.
+    #[inline(always)]
+    fn values(self, targets: &Block<A>, iz: &[A; ROWS], oz: &[A; ROWS], out: &mut Block<A>) {
+        let zero = A::zero();
+        let above = |r: usize| iz[r] > zero && oz[r] > zero;
+        match self {
+            Self::Identity => {
+                for r in 0..ROWS {
+                    // Comparing with itself: not NaN.
+                    let target = targets.0[r];
+                    let is_number = target.abs() <= A::max_value();
+                    out.0[r] = if above(r) && is_number { target } else { zero };
+                }
+            }
+            Self::Log { offset, ceiling } => {
+                for r in 0..ROWS {
+                    let value = offset * (A::exponential(targets.0[r]) - A::one());
+                    // In this order NaN becomes 0.
+                    let value = value.max(zero).min(ceiling);
+                    out.0[r] = if above(r) { value } else { zero };
+                }
+            }
+            Self::CubeRoot { ceiling } => {
+                for r in 0..ROWS {
+                    let target = targets.0[r];
+                    let value = (target * target * target).max(zero).min(ceiling);
+                    out.0[r] = if above(r) { value } else { zero };
+                }
+            }
+        }
+    }
+}
+
+impl<A: Real> Kernel<A> for Packed<A> {
+    fn scratch(&self) -> usize {
+        let hidden = match &self.layers {
+            Layers::Any { hidden, .. } => hidden.blocks(),
+            _ => 0,
+        };
+        self.inputs() + self.outputs() + hidden
+    }
+
+    #[inline(always)]
+    fn block<S: Simd>(
+        &self,
+        simd: S,
+        directions: &[&[A; ROWS]; 6],
+        scratch: &mut [Block<A>],
+        out: &mut [Block<A>],
+    ) {
+        let (x, rest) = scratch.split_at_mut(self.inputs());
+        let (targets, hidden_values) = rest.split_at_mut(self.outputs());
+        inputs::compute(self.features, directions, x);
+        match &self.layers {
+            Layers::Rectified(layers) => {
+                for (layer, targets) in layers.iter().zip(targets.as_chunks_mut::<3>().0) {
+                    layer.run::<S, Rectified>(simd, x, targets);
+                }
+            }
+            Layers::SquaredRectified(layers) => {
+                for (layer, targets) in layers.iter().zip(targets.as_chunks_mut::<3>().0) {
+                    layer.run::<S, SquaredRectified>(simd, x, targets);
+                }
+            }
+            Layers::Any {
+                hidden,
+                functions,
+                output,
+            } => {
+                hidden.run::<S, false>(simd, x, hidden_values);
+                let mut rest = &mut *hidden_values;
+                for (neurons, function) in functions {
+                    let (own, others) = rest.split_at_mut(*neurons);
+                    for block in own {
+                        function.apply_to(&mut block.0);
+                    }
+                    rest = others;
+                }
+                output.run::<S, false>(simd, &hidden_values[..self.neurons], targets);
+            }
+        }
+        let (iz, oz) = (directions[2], directions[5]);
+        for ((link, targets), out) in self.links.iter().zip(&*targets).zip(out) {
+            link.values(targets, iz, oz, out);
+        }
+    }
+}
+
+impl<A: Real> Packed<A> {
+    /// BRDF in 1/sr, without the cosine: all values of the first channel, then those of the next.
+    ///
+    /// # Errors
+    /// [`elm::Error::Shape`] unless `out` has a value for each pair and channel.
+    pub fn eval_into(&self, directions: &Columns<A>, out: &mut [A]) -> Result<()> {
+        run(self, self.links.len(), directions, out)
+    }
+}
+
+impl<A: Real> Batched<A> for Packed<A> {
+    fn channels(&self) -> usize {
+        self.links.len()
+    }
+
+    fn eval_into(&self, directions: &Columns<A>, out: &mut [A]) -> Result<()> {
+        Packed::eval_into(self, directions, out)
+    }
+}
+
+macro_rules! brdf {
+    ($type:ident, $precision:ident) => {
+        impl Brdf for Packed<$type> {
+            fn channels(&self) -> usize {
+                self.links.len()
+            }
+
+            fn multiply_adds(&self) -> usize {
+                self.neurons * (self.inputs() + self.links.len())
+            }
+
+            fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
+                eval_pairs(self, pairs)
+            }
+
+            fn floats_per_channel(&self) -> usize {
+                self.floats_per_channel
+            }
+
+            fn stored_floats(&self) -> usize {
+                self.floats
+            }
+
+            fn by_columns(&self) -> Option<Precision<'_>> {
+                Some(Precision::$precision(self))
+            }
+        }
+    };
+}
+
+brdf!(f32, Single);
+brdf!(f64, Double);

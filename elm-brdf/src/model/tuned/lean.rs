@@ -1,0 +1,227 @@
+//! Networks that are cheap to evaluate: few neurons of one function on arithmetic inputs.
+
+use elm::prune::Keep;
+use elm::solve::Ridge;
+use elm::{Activation, Biases, Distribution, Elm, ElmParams, Scaler};
+use ndarray::{Array2, ArrayView2, Axis};
+use rand::SeedableRng;
+use rand::seq::index;
+use rand_chacha::ChaCha8Rng;
+
+use super::many::{RIDGE, row_weights};
+use super::{Blank, provenance, solve, without_weights};
+use crate::brdf::{Brdf, Fit, check};
+use crate::error::Result;
+use crate::features::Features;
+use crate::geometry::Pair;
+use crate::link::{FittedLink, Link};
+use crate::metrics::{Metric, Metrics};
+use crate::model::{BrdfModel, Layer};
+
+/// A network of so many neurons of one function, made for cheap [evaluation](crate::batch).
+///
+/// # Parameters
+///
+/// | name | default | purpose |
+/// |---|---|---|
+/// | `neurons` | of [`new`](Self::new) | size of the network |
+/// | `features` | [`Features::Algebraic`] | the inputs |
+/// | `activation` | [`Activation::SquaredRelu`] | the neurons' function |
+/// | `pruned` | yes | drawn in plenty and [pruned](elm::prune), or just drawn |
+/// | `metric` | RMSE | the held-out error that chooses, and that rows are weighted for |
+/// | `seed` | 1 | random layers, and rows drawn for the search |
+///
+/// The target is the log. The scales of weights and biases are those, of six pairs, whose network
+/// has the least error on rows that it was not fitted to, of 1500 to fit and 1500 to judge at most;
+/// then the output weights are fitted to all rows, by a ridge whose strength leave-one-out chooses
+/// where there are few ([`Tuned::MANY`](super::Tuned::MANY)).
+///
+/// ```
+/// use elm_brdf::{batch::Packed, geometry::pairs, model::Lean};
+/// use elm_datasets::{Invalid, MaterialId, synthetic};
+///
+/// let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
+/// let samples = data.samples(0).ok_or("no such material")?;
+/// let model = Lean::new(16).fit_model(&pairs(&samples.directions), samples.values.view())?;
+/// let packed: Packed<f32> = Packed::new(&model)?;
+/// assert_eq!(packed.neurons(), 16);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lean {
+    /// Size of the network.
+    pub neurons: usize,
+    /// The inputs.
+    pub features: Features,
+    /// The neurons' function.
+    pub activation: Activation<f64>,
+    /// Whether more neurons are drawn than are kept.
+    pub pruned: bool,
+    /// The error that is made small.
+    pub metric: Metric,
+    /// Seed.
+    pub seed: u64,
+}
+
+/// Rows that the search fits to, and as many others that judge, at most.
+const ROWS: usize = 1500;
+/// Neurons drawn for each one kept, up to [`MOST_DRAWN`].
+const DRAWN: usize = 8;
+const MOST_DRAWN: usize = 256;
+/// Scales of weights, and deviations of biases.
+const SCALES: [f64; 3] = [0.5, 1.0, 2.0];
+const BIASES: [f64; 2] = [0.9, 1.8];
+
+impl Lean {
+    /// So many neurons, and the defaults.
+    #[must_use]
+    pub fn new(neurons: usize) -> Self {
+        Self {
+            neurons,
+            features: Features::Algebraic,
+            activation: Activation::SquaredRelu,
+            pruned: true,
+            metric: Metric::Rmse,
+            seed: 1,
+        }
+    }
+
+    /// Fits one network for all channels of `values` (BRDF in 1/sr, shape (pairs, channels)).
+    ///
+    /// # Errors
+    /// Where these measurements cannot be fitted, or the settings are out of range.
+    pub fn fit_model(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<BrdfModel> {
+        check(pairs, values)?;
+        let link = Link::default_log().fit(values)?;
+        let targets = link.to_targets(values)?;
+        let x = self.features.compute(pairs);
+        let scaler = Scaler::measured(&x)?;
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        random.set_stream(6);
+        let wanted = pairs.len().min(2 * ROWS);
+        let rows = index::sample(&mut random, pairs.len(), wanted).into_vec();
+        // Of few rows most are needed for the fit. A single one is fitted and judges.
+        let judges = if wanted == 2 * ROWS { ROWS } else { wanted / 4 };
+        let (fitted, judged) = rows.split_at(wanted - judges);
+        let search = Search {
+            lean: self,
+            scaler: &scaler,
+            link: &link,
+            ridge: ridge(pairs.len()),
+            x: x.select(Axis(0), fitted),
+            targets: targets.select(Axis(0), fitted),
+            weights: row_weights(
+                self.metric,
+                &select(pairs, fitted),
+                values.select(Axis(0), fitted).view(),
+                &link,
+            ),
+        };
+        let judged = if judged.is_empty() { fitted } else { judged };
+        let judge = Judge {
+            pairs: select(pairs, judged),
+            x: x.select(Axis(0), judged),
+            values: values.select(Axis(0), judged),
+        };
+        let mut best: Option<(f64, Blank, Metrics)> = None;
+        for (scale, bias) in SCALES.into_iter().flat_map(|s| BIASES.map(|b| (s, b))) {
+            let (blank, held_out) = search.try_scales(scale, bias, &judge)?;
+            let error = self.metric.of(&held_out);
+            if best.as_ref().is_none_or(|(least, ..)| error < *least) {
+                best = Some((error, blank, held_out));
+            }
+        }
+        let Some((_, blank, held_out)) = best else {
+            return Err(elm::Error::NoConvergence {
+                what: "the search for a network",
+            }
+            .into());
+        };
+        let h = blank.matrix(&x)?;
+        let weights = row_weights(self.metric, pairs, values, &link);
+        let (beta, intercept) = solve(&h, &targets, weights.as_ref(), ridge(pairs.len()))?;
+        let hidden = blank.network.hidden().clone();
+        let network = Elm::from_parts(Some(scaler.clone()), hidden, beta, intercept)?;
+        let tuned = super::Tuned {
+            metric: self.metric,
+            seed: self.seed,
+            ..super::Tuned::default()
+        };
+        let mut about = provenance(&tuned, pairs, values);
+        about.held_out = Some(held_out);
+        let layer = Layer::Drawn(vec![blank.draw]);
+        Ok(BrdfModel::new(self.features, link, layer, network).with_provenance(about))
+    }
+}
+
+impl Fit for Lean {
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+        Ok(Box::new(self.fit_model(pairs, values)?))
+    }
+}
+
+/// Of many measurements the noise averages out; of few, leave-one-out says how strong a ridge it
+/// takes.
+fn ridge(rows: usize) -> Ridge {
+    if rows > super::Tuned::MANY {
+        Ridge::relative(RIDGE)
+    } else {
+        Ridge::leave_one_out()
+    }
+}
+
+fn select(pairs: &[Pair], rows: &[usize]) -> Vec<Pair> {
+    rows.iter().map(|&row| pairs[row]).collect()
+}
+
+struct Search<'a> {
+    lean: &'a Lean,
+    scaler: &'a Scaler<f64>,
+    link: &'a FittedLink,
+    ridge: Ridge,
+    x: Array2<f64>,
+    targets: Array2<f64>,
+    weights: Option<ndarray::Array1<f64>>,
+}
+
+struct Judge {
+    pairs: Vec<Pair>,
+    x: Array2<f64>,
+    values: Array2<f64>,
+}
+
+impl Search<'_> {
+    fn try_scales(&self, scale: f64, bias: f64, judge: &Judge) -> Result<(Blank, Metrics)> {
+        let neurons = self.lean.neurons;
+        let drawn = if self.lean.pruned {
+            neurons.max((DRAWN * neurons).min(MOST_DRAWN.max(neurons + neurons / 2)))
+        } else {
+            neurons
+        };
+        let params = ElmParams::new(drawn)
+            .activation(self.lean.activation.clone())
+            .distribution(Distribution::Normal)
+            .scale(scale)
+            .biases(Biases::Scaled(bias))
+            .solver(self.ridge)
+            .seed(self.lean.seed);
+        let mut blank = Blank::new(params.clone(), 0, self.scaler)?;
+        if drawn > neurons {
+            let pruned = params.fit_pruned(&self.x, &self.targets, Keep::Neurons(neurons))?;
+            let mut kept = vec![false; drawn];
+            for &number in &pruned.kept {
+                kept[number] = true;
+            }
+            blank.draw.kept = Some(kept);
+            let hidden = blank.network.hidden().subset(&pruned.kept)?;
+            blank.network = without_weights(self.scaler, hidden)?;
+        }
+        let h = blank.matrix(&self.x)?;
+        let (beta, constant) = solve(&h, &self.targets, self.weights.as_ref(), self.ridge)?;
+        let predicted = self
+            .link
+            .to_values(blank.matrix(&judge.x)?.dot(&beta) + &constant)?;
+        let held_out = Metrics::of(&judge.pairs, predicted.view(), judge.values.view())?;
+        Ok((blank, held_out))
+    }
+}

@@ -1,0 +1,95 @@
+//! Every model that the project can fit.
+
+use elm::solve::PseudoInverse;
+use elm::{Activation, ElmParams};
+use ndarray::ArrayView2;
+
+use crate::brdf::{Brdf, Fit};
+use crate::error::Result;
+use crate::features::Features;
+use crate::geometry::Pair;
+use crate::link::Link;
+use crate::metrics::Metric;
+use crate::model::{BrdfParams, Lean, Tuned};
+use crate::reference;
+
+/// A way to fit a model, with its name.
+pub struct Candidate {
+    /// The name.
+    pub name: String,
+    /// The way.
+    pub method: Box<dyn Fit>,
+}
+
+/// Sizes of networks.
+const NEURONS: [usize; 6] = [16, 24, 32, 40, 64, 128];
+
+/// Networks by size, function, and pruned or not; the paper's; the tuned one; and every reference.
+#[must_use]
+pub fn all(metric: Metric, seed: u64) -> Vec<Candidate> {
+    let mut all = Vec::new();
+    for activation in [
+        Activation::Relu,
+        Activation::SquaredRelu,
+        Activation::Isru,
+        Activation::Sine,
+    ] {
+        for neurons in NEURONS {
+            for pruned in [false, true] {
+                let kind = if pruned { "pruned" } else { "drawn" };
+                all.push(Candidate {
+                    name: format!("elm {activation} {neurons} {kind}"),
+                    method: Box::new(Lean {
+                        activation: activation.clone(),
+                        pruned,
+                        metric,
+                        seed,
+                        ..Lean::new(neurons)
+                    }),
+                });
+            }
+        }
+    }
+    all.push(Candidate {
+        name: "elm (paper)".to_owned(),
+        method: Box::new(BrdfParams {
+            features: Features::Paper,
+            link: Link::Identity,
+            network: ElmParams::new(50)
+                .activation(Activation::Sigmoid)
+                .solver(PseudoInverse::default())
+                .intercept(false)
+                .seed(seed),
+        }),
+    });
+    let tuned = Tuned {
+        metric,
+        seed,
+        ..Tuned::default()
+    };
+    all.push(Candidate {
+        name: "elm (tuned)".to_owned(),
+        method: Box::new(Jointly(tuned)),
+    });
+    all.extend(reference::all().into_iter().map(|reference| {
+        let reference = reference.affordable(seed);
+        let inputs = match (reference.features, reference.link) {
+            (Some(features), Some(link)) => format!(" ({features}, {link})"),
+            _ => String::new(),
+        };
+        Candidate {
+            name: format!("{}{inputs}", reference.name),
+            method: reference.method,
+        }
+    }));
+    all
+}
+
+/// One network for all channels, where [`Tuned`] as a [`Fit`] makes one for each.
+struct Jointly(Tuned);
+
+impl Fit for Jointly {
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+        Ok(Box::new(self.0.fit_model(pairs, values)?))
+    }
+}

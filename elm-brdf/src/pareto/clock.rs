@@ -1,0 +1,109 @@
+//! Time per evaluation, the models taking turns.
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use crate::batch::{Batched, Columns, Precision, Real};
+use crate::brdf::Brdf;
+use crate::error::Result;
+use crate::geometry::Pair;
+
+/// Pairs in a batch: its directions and values stay in the second-level cache.
+const BATCH: usize = 4096;
+/// Turns of each model.
+const TURNS: usize = 31;
+/// Seconds that a turn should take.
+const TURN: f64 = 1e-3;
+
+/// A model with its batch and room for the values.
+enum Timed<'a> {
+    Single(&'a dyn Batched<f32>, Columns<f32>, Vec<f32>),
+    Double(&'a dyn Batched<f64>, Columns<f64>, Vec<f64>),
+    General(&'a dyn Brdf, Vec<Pair>),
+}
+
+/// The median time of an evaluation for each model, in nanoseconds.
+pub(super) fn take_turns(models: &[Box<dyn Brdf>], pairs: &[Pair]) -> Result<Vec<f64>> {
+    let batch: Vec<Pair> = pairs.iter().copied().cycle().take(BATCH).collect();
+    // Of each the passes in a turn and the nanoseconds so far.
+    let mut all = Vec::with_capacity(models.len());
+    for model in models {
+        let mut timed = Timed::new(model.as_ref(), &batch);
+        timed.pass()?;
+        let once = timed.seconds(1)?;
+        if let Timed::General(_, pairs) = &mut timed {
+            // A slow model has a smaller batch.
+            let share = (5.0 * TURN / once.max(1e-9)).min(1.0);
+            pairs.truncate(((pairs.len() as f64 * share) as usize).max(64));
+        }
+        let once = timed.seconds(1)?;
+        let passes = ((TURN / once.max(1e-9)) as usize).clamp(1, 1000);
+        all.push((timed, passes, Vec::with_capacity(TURNS)));
+    }
+    for _ in 0..TURNS {
+        for (timed, passes, times) in &mut all {
+            let evaluations = timed.rows() * *passes;
+            times.push(timed.seconds(*passes)? / evaluations as f64 * 1e9);
+        }
+    }
+    Ok(all.into_iter().map(|(_, _, times)| median(times)).collect())
+}
+
+impl<'a> Timed<'a> {
+    fn new(model: &'a dyn Brdf, batch: &[Pair]) -> Self {
+        fn room<A: Real>(model: &dyn Batched<A>, batch: &[Pair]) -> (Columns<A>, Vec<A>) {
+            let values = vec![A::zero(); batch.len() * model.channels()];
+            (Columns::new(batch), values)
+        }
+        match model.by_columns() {
+            Some(Precision::Single(model)) => {
+                let (columns, values) = room(model, batch);
+                Self::Single(model, columns, values)
+            }
+            Some(Precision::Double(model)) => {
+                let (columns, values) = room(model, batch);
+                Self::Double(model, columns, values)
+            }
+            None => Self::General(model, batch.to_vec()),
+        }
+    }
+
+    fn rows(&self) -> usize {
+        match self {
+            Self::Single(_, columns, _) => columns.len(),
+            Self::Double(_, columns, _) => columns.len(),
+            Self::General(_, pairs) => pairs.len(),
+        }
+    }
+
+    fn pass(&mut self) -> Result<()> {
+        match self {
+            Self::Single(model, columns, values) => {
+                model.eval_into(columns, values)?;
+                black_box(values);
+            }
+            Self::Double(model, columns, values) => {
+                model.eval_into(columns, values)?;
+                black_box(values);
+            }
+            Self::General(model, pairs) => {
+                black_box(model.eval(pairs)?);
+            }
+        }
+        Ok(())
+    }
+
+    fn seconds(&mut self, passes: usize) -> Result<f64> {
+        let start = Instant::now();
+        for _ in 0..passes {
+            self.pass()?;
+        }
+        Ok(start.elapsed().as_secs_f64())
+    }
+}
+
+/// The middle value, or the upper of the two in the middle; 0 of none.
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
