@@ -323,12 +323,9 @@ fn impossible_scenes_are_errors_of_one_line_that_name_the_place() {
         ),
         (
             with("", "[[mesh]]\nfile = 'no.obj'\nmaterial = 'm'"),
-            "cannot read no.obj",
+            "no.obj: ",
         ),
-        (
-            with("", "[environment]\nfile = 'no.exr'"),
-            "cannot read no.exr",
-        ),
+        (with("", "[environment]\nfile = 'no.exr'"), "no.exr: "),
         (with("samples = 0", ""), "image.samples is 0"),
         (with("samples = 100000", ""), "100000 samples per pixel"),
         (with("exposure = nan", ""), "image.exposure is NaN"),
