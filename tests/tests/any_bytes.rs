@@ -3,13 +3,21 @@
 
 use std::fs;
 use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use elm_tests::any_bytes::{READERS, Reader};
 use proptest::prelude::*;
 use proptest::sample::Index;
 
+/// Two tests at once would count each other's memory.
+fn alone() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 #[test]
 fn every_committed_file_is_read_as_its_name_says() {
+    let _alone = alone();
     for reader in READERS {
         let dir = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fuzz/corpus"));
         let mut whole = 0;
@@ -39,6 +47,7 @@ fn every_committed_file_is_read_as_its_name_says() {
 
 #[test]
 fn seeds_are_read_as_their_names_say() {
+    let _alone = alone();
     for reader in READERS {
         for seed in (reader.seeds)() {
             let read = reader.check(&seed.bytes);
@@ -118,6 +127,7 @@ proptest! {
     fn random_bytes_are_read_as_they_must_be(
         reader in any_reader(), bytes in proptest::collection::vec(any::<u8>(), 0..200),
     ) {
+        let _alone = alone();
         reader.check(&bytes);
     }
 
@@ -126,6 +136,7 @@ proptest! {
         reader in any_reader(), seed in any::<Index>(), changes in changes(),
         end in proptest::option::weighted(0.2, any::<Index>()),
     ) {
+        let _alone = alone();
         let seeds = (reader.seeds)();
         let mut bytes = mutate(seed.get(&seeds).bytes.clone(), changes);
         if let Some(end) = end {
