@@ -4,30 +4,15 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use elm::ElmParams;
-use elm::solve::PseudoInverse;
 use elm_brdf::brdf::Fit;
-use elm_brdf::features::Features;
 use elm_brdf::geometry::pairs;
-use elm_brdf::link::Link;
 use elm_brdf::model::{BrdfParams, ScaledOnce};
 use elm_brdf::protocol::{Folds, cross_validate};
 use elm_datasets::{Invalid, MaterialId, Measurements, synthetic};
 use ndarray::{Axis, concatenate};
 
-fn paper() -> BrdfParams {
-    BrdfParams {
-        features: Features::Paper,
-        link: Link::Identity,
-        network: ElmParams::new(50)
-            .solver(PseudoInverse::default())
-            .intercept(false)
-            .seed(1),
-    }
-}
-
 fn scores(data: &Measurements, folds: &Folds) -> usize {
-    cross_validate(&paper(), data, folds, |_, _| {}).map_or(0, |scores| scores.len())
+    cross_validate(&BrdfParams::paper(50), data, folds, |_, _| {}).map_or(0, |scores| scores.len())
 }
 
 fn reproduce(criterion: &mut Criterion) {
@@ -47,7 +32,7 @@ fn reproduce(criterion: &mut Criterion) {
         bencher.iter(|| scores(black_box(&together), &folds));
     });
     group.bench_function("all materials together, inputs scaled once", |bencher| {
-        let Ok(once) = ScaledOnce::new(paper()) else {
+        let Ok(once) = ScaledOnce::new(BrdfParams::paper(50)) else {
             return;
         };
         bencher.iter(|| {
@@ -66,10 +51,10 @@ fn reproduce(criterion: &mut Criterion) {
         ("fits, fold by fold", false),
         ("fits, inputs scaled once", true),
     ] {
-        let Ok(scaled) = ScaledOnce::new(paper()) else {
+        let Ok(scaled) = ScaledOnce::new(BrdfParams::paper(50)) else {
             return;
         };
-        let plain = paper();
+        let plain = BrdfParams::paper(50);
         let method: &dyn Fit = if once { &scaled } else { &plain };
         group.bench_function(name, |bencher| {
             bencher.iter(|| {

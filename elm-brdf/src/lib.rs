@@ -11,16 +11,11 @@
 //! [`report`].
 //!
 //! ```
-//! use elm::{ElmParams, solve::PseudoInverse};
-//! use elm_brdf::{features::Features, link::Link, model::BrdfParams, protocol};
+//! use elm_brdf::{model::BrdfParams, protocol};
 //! use elm_datasets::{Invalid, MaterialId, synthetic};
 //!
 //! let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
-//! let paper = BrdfParams {
-//!     features: Features::Paper,
-//!     link: Link::Identity,
-//!     network: ElmParams::new(50).solver(PseudoInverse::default()).intercept(false),
-//! };
+//! let paper = BrdfParams::paper(50);
 //! let folds = protocol::Folds::new(data.directions.len(), 10, 1)?;
 //! let scores = protocol::cross_validate(&paper, &data, &folds, |_, _| {})?;
 //! let red = &scores[0].channels[0];
@@ -52,5 +47,6 @@ pub mod quality;
 pub mod reference;
 pub mod render;
 pub mod report;
+mod scales;
 
 pub use error::{Error, Result};

@@ -34,7 +34,7 @@ use crate::features::Features;
 use crate::geometry::Pair;
 use crate::link::Link;
 use crate::metrics::Metrics;
-use crate::model::{BrdfModel, Draw, Layer, SideBySide, without_weights};
+use crate::model::{BrdfModel, Draw, Layer, without_weights};
 
 /// How a [`Prior`] is built.
 ///
@@ -253,6 +253,23 @@ impl Prior {
     /// # Errors
     /// Where these measurements cannot be fitted.
     pub fn fit_model(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<BrdfModel> {
+        let mut left_out = Array2::zeros(values.dim());
+        let model = self.fit_judged(pairs, values, Some(&mut left_out))?;
+        let link = model.link();
+        let predicted = link.to_values(link.to_targets(values)? - left_out)?;
+        let mut about = model.provenance().clone();
+        about.held_out = Some(Metrics::of(pairs, predicted.view(), values)?);
+        Ok(model.with_provenance(about))
+    }
+
+    /// Adds leave-one-out residuals of the targets to `left_out` if they are wanted: they take
+    /// factorisations of their own.
+    pub(crate) fn fit_judged(
+        &self,
+        pairs: &[Pair],
+        values: ArrayView2<'_, f64>,
+        mut left_out: Option<&mut Array2<f64>>,
+    ) -> Result<BrdfModel> {
         check(pairs, values)?;
         let x = self.features.compute(pairs);
         let h = self.layer.hidden_matrix(&x)?;
@@ -272,7 +289,6 @@ impl Prior {
         let mut beta = Array2::zeros((h.ncols(), values.ncols()));
         beta += &self.mean.beta.view().insert_axis(Axis(1));
         let mut intercept = Array1::from_elem(values.ncols(), self.mean.constant[0]);
-        let mut held_out = Array2::zeros(targets.dim());
         for general in GENERAL {
             let rho = (general * relative).sqrt();
             let design =
@@ -284,15 +300,16 @@ impl Prior {
                     })
                 })?;
             let problem = LeastSquares::new(&design, &rest)?.intercept(true);
-            let validator = Validator::new(&problem)?;
-            let lambda = validator.strengths(Ridge::leave_one_out())?;
-            let left_out = match validator.leave_one_out(&lambda) {
-                Ok(left_out) => left_out.residuals().to_owned(),
-                // One measurement: nothing can be left out of it.
-                Err(elm::Error::Undetermined { .. }) => rest.clone(),
-                Err(error) => return Err(error.into()),
-            };
-            held_out.scaled_add(share, &left_out);
+            if let Some(sum) = left_out.as_deref_mut() {
+                let validator = Validator::new(&problem)?;
+                let lambda = validator.strengths(Ridge::leave_one_out())?;
+                match validator.leave_one_out(&lambda) {
+                    Ok(held_out) => sum.scaled_add(share, &held_out.residuals()),
+                    // One measurement: nothing can be left out of it.
+                    Err(elm::Error::Undetermined { .. }) => sum.scaled_add(share, &rest),
+                    Err(error) => return Err(error.into()),
+                }
+            }
             let solution = Solver::from(Ridge::leave_one_out()).solve(&problem)?;
             let (z, w) = solution.beta.view().split_at(Axis(0), taught.ncols());
             beta.scaled_add(share, &self.deviations.beta.dot(&z));
@@ -302,7 +319,6 @@ impl Prior {
         }
         let hidden = self.layer.hidden().clone();
         let network = Elm::from_parts(self.layer.scaler().cloned(), hidden, beta, intercept)?;
-        let predicted = link.to_values(&targets - &held_out)?;
         let layer = Layer::Drawn(vec![Draw {
             params: self.params.clone(),
             kept: None,
@@ -311,7 +327,6 @@ impl Prior {
         let mut model = BrdfModel::new(self.features, link, layer, network);
         let mut about = model.provenance().clone();
         about.rows = pairs.len();
-        about.held_out = Some(Metrics::of(pairs, predicted.view(), values)?);
         about.prior = Some(self.source.clone());
         model = model.with_provenance(about);
         Ok(model)
@@ -321,7 +336,7 @@ impl Prior {
 impl Fit for Prior {
     fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
         // Each channel has strengths of its own, so that one network serves them.
-        Ok(Box::new(SideBySide(vec![self.fit_model(pairs, values)?])))
+        Ok(Box::new(self.fit_judged(pairs, values, None)?))
     }
 }
 

@@ -227,7 +227,7 @@ impl Fit for ByChannel {
             .0
             .iter()
             .zip(columns)
-            .map(|(prior, column)| prior.fit_model(pairs, column));
+            .map(|(prior, column)| prior.fit_judged(pairs, column, None));
         Ok(Box::new(SideBySide(models.collect::<Result<_>>()?)))
     }
 }

@@ -8,10 +8,6 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use elm::ElmParams;
-use elm::solve::PseudoInverse;
-use elm_brdf::features::Features;
-use elm_brdf::link::Link;
 use elm_brdf::metrics::Metrics;
 use elm_brdf::model::BrdfParams;
 use elm_brdf::protocol::{Folds, Scores, cross_validate};
@@ -53,14 +49,7 @@ fn distances(data: &Measurements) -> Result<(), Box<dyn Error>> {
     for neurons in NEURONS {
         let runs = (1..=SEEDS)
             .map(|seed| {
-                let params = BrdfParams {
-                    features: Features::Paper,
-                    link: Link::Identity,
-                    network: ElmParams::new(neurons)
-                        .solver(PseudoInverse::default())
-                        .intercept(false)
-                        .seed(seed),
-                };
+                let params = BrdfParams::paper(neurons).seed(seed);
                 let folds = Folds::new(data.directions.len(), FOLDS, seed)?;
                 cross_validate(&params, data, &folds, |_, _| {})
             })

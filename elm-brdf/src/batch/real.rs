@@ -3,8 +3,7 @@
 use pulp::Simd;
 
 /// `f32` or `f64`: in vector registers, and with an exponential that a loop over a block can use.
-///
-/// Not public: it cannot be named outside this crate, which alone implements it.
+/// No other type can be one, as none is an [`elm::Scalar`].
 #[allow(missing_docs)]
 pub trait Real: elm::Scalar {
     type Wide<S: Simd>: Copy;

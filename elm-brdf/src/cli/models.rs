@@ -1,6 +1,6 @@
 //! The models that commands know by name.
 
-use elm::solve::{PseudoInverse, Ridge};
+use elm::solve::Ridge;
 use elm::{Activation, ElmParams};
 use elm_datasets::{Invalid, Measurements};
 
@@ -105,7 +105,6 @@ pub(super) fn select(list: &str, seed: u64) -> Result<Vec<Reference>, Failure> {
 
 /// The paper's network, and the same idea with inputs, target and ridge that suit the task.
 fn networks(seed: u64) -> [Reference; 4] {
-    let network = |neurons: usize| ElmParams::new(neurons).seed(seed);
     let reference = |name: &str, params: BrdfParams| Reference {
         name: name.to_owned(),
         features: Some(params.features),
@@ -117,22 +116,16 @@ fn networks(seed: u64) -> [Reference; 4] {
     [
         reference(
             "elm (paper)",
-            BrdfParams {
-                features: Features::Paper,
-                link: Link::Identity,
-                // As 'reproduce' has it: eq. 7 and 11.
-                network: network(50)
-                    .activation(Activation::Sigmoid)
-                    .solver(PseudoInverse::default())
-                    .intercept(false),
-            },
+            // As 'reproduce' has it.
+            BrdfParams::paper(50).seed(seed),
         ),
         reference(
             "elm (200 sine, ridge)",
             BrdfParams {
                 features: Features::Cosines,
                 link: Link::default_log(),
-                network: network(200)
+                network: ElmParams::new(200)
+                    .seed(seed)
                     .activation(Activation::Sine)
                     .solver(Ridge::leave_one_out()),
             },

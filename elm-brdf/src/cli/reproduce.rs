@@ -4,16 +4,14 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
+use elm::Activation;
 use elm::solve::{PseudoInverse, Solver};
-use elm::{Activation, ElmParams};
 use elm_datasets::{Invalid, Measurements};
 
 use super::common::{hint, one_of, progress, usage};
 use super::data::Source;
 use super::{Failure, models, print};
 use crate::brdf::Fit;
-use crate::features::Features;
-use crate::link::Link;
 use crate::model::{BrdfParams, ScaledOnce};
 use crate::protocol::{Folds, MaterialScores, cross_validate};
 use crate::report::plot::{self, Shown};
@@ -156,16 +154,12 @@ impl Model {
                 "--scaling once needs --solver pseudo-inverse, found --solver {solver}"
             )));
         }
-        let params = BrdfParams {
-            features: Features::Paper,
-            link: Link::Identity,
-            network: ElmParams::new(arguments.neurons.unwrap_or(50))
-                .activation(arguments.activation())
-                .solver(solver)
-                // Equation 7 has no constant term.
-                .intercept(false)
-                .seed(arguments.seed),
-        };
+        let mut params = BrdfParams::paper(arguments.neurons.unwrap_or(50));
+        params.network = params
+            .network
+            .activation(arguments.activation())
+            .solver(solver)
+            .seed(arguments.seed);
         params.network.clone().check().map_err(usage)?;
         Ok(Self::Paper(Box::new(params), once))
     }
@@ -211,8 +205,7 @@ impl Model {
     fn method(&self, seed: u64) -> Result<Option<Box<dyn Fit>>, Failure> {
         Ok(match self {
             Self::Paper(params, once) => {
-                let mut params = (**params).clone();
-                params.network = params.network.seed(seed);
+                let params = (**params).clone().seed(seed);
                 Some(if *once {
                     Box::new(ScaledOnce::new(params)?)
                 } else {

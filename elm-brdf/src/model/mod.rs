@@ -16,7 +16,8 @@ mod tuned;
 
 use std::path::Path;
 
-use elm::{Elm, ElmParams, persist};
+use elm::solve::PseudoInverse;
+use elm::{Activation, Elm, ElmParams, persist};
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
@@ -45,20 +46,13 @@ pub struct BrdfParams {
 /// A fitted reflectance model.
 ///
 /// ```
-/// use elm::{ElmParams, solve::PseudoInverse};
-/// use elm_brdf::{brdf::{Brdf, Fit}, features::Features, geometry::pairs, link::Link};
-/// use elm_brdf::model::BrdfParams;
+/// use elm_brdf::{brdf::{Brdf, Fit}, geometry::pairs, model::BrdfParams};
 /// use elm_datasets::{Invalid, MaterialId, synthetic};
 ///
 /// let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
 /// let samples = data.samples(0).ok_or("no such material")?;
-/// let params = BrdfParams {
-///     features: Features::Paper,
-///     link: Link::Identity,
-///     network: ElmParams::new(50).solver(PseudoInverse::default()).intercept(false),
-/// };
 /// let pairs = pairs(&samples.directions);
-/// let model = params.fit(&pairs, samples.values.view())?;
+/// let model = BrdfParams::paper(50).fit(&pairs, samples.values.view())?;
 /// assert_eq!(model.eval(&pairs)?.dim(), (205, 3));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -174,6 +168,27 @@ impl BrdfModel {
 }
 
 impl BrdfParams {
+    /// The paper's: its six inputs, the value itself for a target, so many sigmoid neurons (eq. 7,
+    /// which has no constant term), and the pseudo-inverse (eq. 11).
+    #[must_use]
+    pub fn paper(neurons: usize) -> Self {
+        Self {
+            features: Features::Paper,
+            link: Link::Identity,
+            network: ElmParams::new(neurons)
+                .activation(Activation::Sigmoid)
+                .solver(PseudoInverse::default())
+                .intercept(false),
+        }
+    }
+
+    /// The same with another seed of the random layer.
+    #[must_use]
+    pub fn seed(mut self, seed: u64) -> Self {
+        self.network = self.network.seed(seed);
+        self
+    }
+
     /// As [`Fit::fit`], with the model itself for an answer.
     ///
     /// # Errors

@@ -259,7 +259,12 @@ fn solve(
 }
 
 /// What is known of measurements whatever is fitted to them.
-fn provenance(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Provenance {
+fn provenance(
+    seed: u64,
+    metric: Metric,
+    pairs: &[Pair],
+    values: ArrayView2<'_, f64>,
+) -> Provenance {
     let exchanged = quality::exchanged(pairs);
     let floors: Vec<f64> = values
         .columns()
@@ -270,8 +275,8 @@ fn provenance(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Pro
     let channels = floors.len();
     Provenance {
         rows: pairs.len(),
-        seed: tuned.seed,
-        metric: Some(tuned.metric),
+        seed,
+        metric: Some(metric),
         noise_floor: (channels > 0).then(|| floors.iter().sum::<f64>() / channels as f64),
         ..Provenance::default()
     }

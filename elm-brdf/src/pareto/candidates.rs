@@ -1,14 +1,11 @@
 //! Every model that the project can fit.
 
-use elm::solve::PseudoInverse;
-use elm::{Activation, ElmParams};
+use elm::Activation;
 use ndarray::ArrayView2;
 
 use crate::brdf::{Brdf, Fit};
 use crate::error::Result;
-use crate::features::Features;
 use crate::geometry::Pair;
-use crate::link::Link;
 use crate::metrics::Metric;
 use crate::model::{BrdfParams, Lean, Tuned};
 use crate::reference;
@@ -52,15 +49,7 @@ pub fn all(metric: Metric, seed: u64) -> Vec<Candidate> {
     }
     all.push(Candidate {
         name: "elm (paper)".to_owned(),
-        method: Box::new(BrdfParams {
-            features: Features::Paper,
-            link: Link::Identity,
-            network: ElmParams::new(50)
-                .activation(Activation::Sigmoid)
-                .solver(PseudoInverse::default())
-                .intercept(false)
-                .seed(seed),
-        }),
+        method: Box::new(BrdfParams::paper(50).seed(seed)),
     });
     let tuned = Tuned {
         metric,
@@ -73,12 +62,8 @@ pub fn all(metric: Metric, seed: u64) -> Vec<Candidate> {
     });
     all.extend(reference::all().into_iter().map(|reference| {
         let reference = reference.affordable(seed);
-        let inputs = match (reference.features, reference.link) {
-            (Some(features), Some(link)) => format!(" ({features}, {link})"),
-            _ => String::new(),
-        };
         Candidate {
-            name: format!("{}{inputs}", reference.name),
+            name: reference.full_name(),
             method: reference.method,
         }
     }));

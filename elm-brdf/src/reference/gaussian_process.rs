@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::geometry::Pair;
 use crate::link::Link;
+use crate::scales::spread;
 
 /// Correlation of the process at a distance $r$ in units of the length scales.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -106,24 +107,6 @@ impl GaussianProcess {
         }
     }
 
-    /// Inverse length scales, shape (candidates, inputs): an additive recurrence, evenly spread in
-    /// the logarithm.
-    ///
-    /// M. Roberts, *The Unreasonable Effectiveness of Quasirandom Sequences*, 2018.
-    fn scales(&self, inputs: usize) -> Array2<f64> {
-        // The root of x^(d+1) = x + 1, by fixed-point iteration.
-        let mut root = 2.0_f64;
-        for _ in 0..60 {
-            root = (1.0 + root).powf(1.0 / (inputs as f64 + 1.0));
-        }
-        let (low, high) = (LENGTHS.0.ln(), LENGTHS.1.ln());
-        Array2::from_shape_fn((self.candidates, inputs), |(candidate, input)| {
-            let step = root.powi(-(input as i32 + 1));
-            let place = (0.5 + (candidate as f64 + 1.0) * step).fract();
-            (-(low + place * (high - low))).exp()
-        })
-    }
-
     fn kernel(&self, a: &Array2<f64>, b: &Array2<f64>) -> Array2<f64> {
         kernel(self.covariance, a, b)
     }
@@ -151,7 +134,8 @@ impl Fit for GaussianProcess {
             noise: 1.0,
         };
         let mut choices = vec![none; targets.ncols()];
-        let scales = self.scales(frame.inputs());
+        // 1 / length scale of each input.
+        let scales = spread(self.candidates, frame.inputs(), LENGTHS).mapv_into(f64::recip);
         let decompose = |candidate: usize| {
             let scaled = &x * &scales.row(candidate);
             let kernel = self.kernel(&scaled, &scaled);

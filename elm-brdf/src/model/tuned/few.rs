@@ -12,6 +12,7 @@ use crate::geometry::Pair;
 use crate::link::Link;
 use crate::metrics::{Metric, Metrics};
 use crate::model::{BrdfModel, Layer, Provenance};
+use crate::scales::spread;
 
 /// Neurons of a candidate.
 const NEURONS: usize = 400;
@@ -47,7 +48,7 @@ pub(super) fn fit(
             Some(search.network(candidate, &targets, columns)?)
         });
     }
-    let about = provenance(tuned, pairs, values);
+    let about = provenance(tuned.seed, tuned.metric, pairs, values);
     let model = |(group, choice): (&Vec<usize>, Choice)| {
         let link = link.fit(values.select(Axis(1), group).view())?;
         let taken = choice.members.iter().filter_map(|&c| networks[c].as_ref());
@@ -98,7 +99,7 @@ impl Search {
         let scaler = Scaler::measured(&x)?;
         let neurons = tuned.size(NEURONS, x.ncols(), channels, 2, |_| 0)?;
         let limited = tuned.neurons.is_some() || tuned.max_floats.is_some();
-        let scales = spread(CANDIDATES, x.ncols());
+        let scales = spread(CANDIDATES, x.ncols(), SCALES);
         let params = |scales: ArrayView1<'_, f64>| tuned.waves(neurons, &scales.to_vec());
         let mut search = Self {
             set,
@@ -220,22 +221,4 @@ fn average(
     let draws = networks.iter().map(|n| n.blank.draw.clone()).collect();
     let network = Elm::from_parts(Some(scaler.clone()), hidden, beta, intercept)?;
     Ok((Layer::Drawn(draws), network))
-}
-
-/// Scales of inputs, shape (candidates, inputs): an additive recurrence, evenly spread in the
-/// logarithm.
-///
-/// M. Roberts, *The Unreasonable Effectiveness of Quasirandom Sequences*, 2018.
-fn spread(candidates: usize, inputs: usize) -> Array2<f64> {
-    // The root of x^(d+1) = x + 1, by fixed-point iteration.
-    let mut root = 2.0_f64;
-    for _ in 0..60 {
-        root = (1.0 + root).powf(1.0 / (inputs as f64 + 1.0));
-    }
-    let (low, high) = (SCALES.0.ln(), SCALES.1.ln());
-    Array2::from_shape_fn((candidates, inputs), |(candidate, input)| {
-        let step = root.powi(-(input as i32 + 1));
-        let place = (0.5 + (candidate as f64 + 1.0) * step).fract();
-        (low + place * (high - low)).exp()
-    })
 }

@@ -142,12 +142,7 @@ impl Lean {
         let (beta, intercept) = solve(&h, &targets, weights.as_ref(), ridge(pairs.len()))?;
         let hidden = blank.network.hidden().clone();
         let network = Elm::from_parts(Some(scaler.clone()), hidden, beta, intercept)?;
-        let tuned = super::Tuned {
-            metric: self.metric,
-            seed: self.seed,
-            ..super::Tuned::default()
-        };
-        let mut about = provenance(&tuned, pairs, values);
+        let mut about = provenance(self.seed, self.metric, pairs, values);
         about.held_out = Some(held_out);
         let layer = Layer::Drawn(vec![blank.draw]);
         Ok(BrdfModel::new(self.features, link, layer, network).with_provenance(about))

@@ -75,7 +75,7 @@ pub(super) fn fit(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) ->
     let weights = row_weights(tuned.metric, pairs, values, &link);
     let (beta, intercept) = solve(&h, &targets, weights.as_ref(), Ridge::relative(RIDGE))?;
     let network = Elm::from_parts(Some(scaler), hidden, beta, intercept)?;
-    let mut about = provenance(tuned, pairs, values);
+    let mut about = provenance(tuned.seed, tuned.metric, pairs, values);
     about.held_out = Some(setting.held_out);
     let layer = Layer::Drawn(vec![blank.draw]);
     Ok(BrdfModel::new(setting.set, link, layer, network).with_provenance(about))
