@@ -25,8 +25,8 @@
 //! ```
 //!
 //! # How
-//! Backward elimination under ridge of one strength $\lambda$, that which generalised
-//! cross-validation chooses for all candidates. With $A = (\tilde H^T \tilde H + \lambda)^{-1}$
+//! Backward elimination under ridge of one strength $\lambda$: the solver's, or where that chooses
+//! its own the one that generalised cross-validation chooses for all candidates. With $A = (\tilde H^T \tilde H + \lambda)^{-1}$
 //! striking out neuron $k$ and fitting the others again costs
 //! $$\frac{\beta_k^2}{A_{kk}}$$
 //! of the penalised sum of squares (of several outputs, the sum of these relative to the outputs'
@@ -64,8 +64,9 @@ use crate::model::{CheckedParams, Drawn, ElmParams, Targets};
 use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::solve::frame::{Frame, Prepared};
+use crate::solve::lanczos::largest_eigenvalue;
 use crate::solve::spectrum::Spectrum;
-use crate::solve::{LeastSquares, Ridge, Solver};
+use crate::solve::{Lambda, LeastSquares, Ridge, Solver};
 
 /// How much of a layer stays.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -285,22 +286,27 @@ impl Root {
             let none = Array1::zeros(targets.ncols());
             (hidden.clone(), targets.clone(), none)
         };
-        let spectrum = Spectrum::from_triangle(
-            Prepared {
-                hidden: hidden.clone(),
-                targets: targets.clone(),
-                frame: frame.clone(),
-            },
-            unreached,
-        )?;
-        let relative = ridge.shared(true).strengths_without_rows(&spectrum);
-        let relative = relative.first().copied().unwrap_or(FLOOR).max(FLOOR);
-        let lambda = match spectrum.s.first() {
-            Some(&largest) => relative * largest * largest,
-            // No column varies: any ridge does.
-            None => 1.0,
+        let lengths = targets.columns().into_iter().map(|t| t.dot(&t));
+        let squares = lengths.collect::<Array1<f64>>() + &unreached;
+        // The relative strength and what it is relative to; nothing where no column varies.
+        let strength = if let Lambda::Relative(relative) = ridge.lambda() {
+            largest_eigenvalue(&f64::gram(hidden.view())).map(|largest| (relative, largest))
+        } else {
+            let spectrum = Spectrum::from_triangle(
+                Prepared {
+                    hidden: hidden.clone(),
+                    targets: targets.clone(),
+                    frame: frame.clone(),
+                },
+                unreached,
+            )?;
+            let relative = ridge.shared(true).strengths_without_rows(&spectrum);
+            let relative = relative.first().copied().unwrap_or(FLOOR);
+            spectrum.s.first().map(|s| (relative, s * s))
         };
-        let output_weights = spectrum.total_squares().mapv(reciprocal_or_one);
+        // Where no column varies any ridge does.
+        let lambda = strength.map_or(1.0, |(relative, largest)| relative.max(FLOOR) * largest);
+        let output_weights = squares.mapv_into(reciprocal_or_one);
         Ok(Self {
             hidden,
             targets,

@@ -5,7 +5,7 @@
 mod common;
 
 use common::{Problem, doubled_rows, frobenius, normal, problems, weights};
-use elm::solve::{Inverse, PseudoInverse, Ridge};
+use elm::solve::{Inverse, LeastSquares, PseudoInverse, Ridge, Solver};
 use elm::validate::{Validator, assign_folds};
 use elm::{ElmParams, Error, Scalar, metrics};
 use ndarray::{Array2, Axis, array};
@@ -448,4 +448,116 @@ fn values_at_the_ends_of_the_range_are_validated_alike() {
         .leave_one_out(&[1e-3])
         .unwrap();
     assert_eq!(held_out.rmse(), [0.0]);
+}
+
+#[test]
+fn a_validator_solves_as_ridge_does() {
+    for (name, problem) in problems::<f64>() {
+        let validator = Validator::new(&problem.view()).unwrap();
+        for lambda in [1e-10, 1e-3] {
+            let (found, truth) = (
+                validator.solve(&[lambda]).unwrap(),
+                problem.solve(Ridge::relative(lambda)),
+            );
+            // Both have errors of about epsilon / lambda.
+            let bound = 1e-15 / lambda * (1.0 + frobenius(&truth.beta));
+            let error = frobenius(&(&found.beta - &truth.beta));
+            assert!(error <= 100.0 * bound, "{name} at {lambda}: {error}");
+        }
+    }
+}
+
+/// Lower triangle of the Cholesky factorisation, by the textbook.
+fn cholesky(a: &Array2<f64>) -> Array2<f64> {
+    let mut l = Array2::<f64>::zeros(a.dim());
+    for i in 0..a.nrows() {
+        for j in 0..=i {
+            let sum = a[[i, j]] - (0..j).map(|k| l[[i, k]] * l[[j, k]]).sum::<f64>();
+            l[[i, j]] = if i == j { sum.sqrt() } else { sum / l[[j, j]] };
+        }
+    }
+    l
+}
+
+/// $L^{-1} b$.
+fn forward(l: &Array2<f64>, b: &[f64]) -> Vec<f64> {
+    let mut x: Vec<f64> = Vec::new();
+    for (i, b) in b.iter().enumerate() {
+        let known: f64 = x.iter().enumerate().map(|(k, x)| l[[i, k]] * x).sum();
+        x.push((b - known) / l[[i, i]]);
+    }
+    x
+}
+
+#[test]
+fn evidence_is_the_density_of_the_targets_under_the_model_that_ridge_stands_for() {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    for (rows, neurons) in [(12, 5), (8, 20)] {
+        let h = Array2::from_shape_fn((rows, neurons), |(i, j)| {
+            ((i * i) as f64 * 0.37 + (j * (i + 2)) as f64 * 1.3).sin()
+        });
+        let t = Array2::from_shape_fn((rows, 2), |(i, o)| {
+            100.0 + ((i * (o + 3)) as f64 * 0.9).cos()
+        });
+        for intercept in [false, true] {
+            let problem = LeastSquares::new(&h, &t).unwrap().intercept(intercept);
+            let validator = Validator::new(&problem).unwrap();
+            let largest = Solver::from(Ridge::relative(1.0))
+                .solve(&problem)
+                .unwrap()
+                .diagnosis
+                .largest_singular_value;
+            for lambda in [1e-6, 1e-2, 10.0] {
+                let found = validator.log_evidence(&[lambda]).unwrap();
+                // Covariance over sigma^2: I + H H^T / lambda.
+                let covariance =
+                    Array2::<f64>::eye(rows) + h.dot(&h.t()) / (lambda * largest * largest);
+                let l = cholesky(&covariance);
+                let log_determinant: f64 = 2.0 * l.diag().mapv(f64::ln).sum();
+                let ones = forward(&l, &vec![1.0; rows]);
+                for (output, found) in found.into_iter().enumerate() {
+                    let z = forward(&l, &t.column(output).to_vec());
+                    // Without a constant the density itself; with one the density of what remains
+                    // of the targets when it is taken out (Harville, Biometrika 61(2), 1974).
+                    let (m, q, more) = if intercept {
+                        let q = dot(&z, &z) - dot(&z, &ones).powi(2) / dot(&ones, &ones);
+                        (rows - 1, q, (dot(&ones, &ones) / rows as f64).ln())
+                    } else {
+                        (rows, dot(&z, &z), 0.0)
+                    };
+                    let m = m as f64;
+                    let expected = -0.5
+                        * (m * ((std::f64::consts::TAU * q / m).ln() + 1.0)
+                            + log_determinant
+                            + more);
+                    assert!(
+                        (found - expected).abs() < 1e-6 * expected.abs().max(1.0),
+                        "{rows} x {neurons}, {intercept}, {lambda}: {found} {expected}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn evidence_needs_a_strength_and_a_row_to_judge() {
+    let (h, t) = (array![[1.0], [2.0]], array![[1.0], [3.0]]);
+    let validator = Validator::new(&LeastSquares::new(&h, &t).unwrap()).unwrap();
+    for lambda in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(matches!(
+            validator.log_evidence(&[lambda]),
+            Err(Error::Parameter { name: "lambda", .. })
+        ));
+    }
+    assert!(matches!(
+        validator.log_evidence(&[1.0, 1.0, 1.0]),
+        Err(Error::Shape { .. })
+    ));
+    let one = array![[1.0]];
+    let alone = LeastSquares::new(&one, &one).unwrap().intercept(true);
+    assert!(matches!(
+        Validator::new(&alone).unwrap().log_evidence(&[1.0]),
+        Err(Error::Undetermined { .. })
+    ));
 }

@@ -30,10 +30,12 @@ pub use lean::Lean;
 /// | `max_floats` | none | most numbers that the model may store |
 /// | `seed` | 1 | random layers, and rows drawn for the search |
 ///
-/// **Few measurements** (up to [`Tuned::MANY`]): sine neurons with random frequencies. The scales of the inputs are tried from a fixed low-discrepancy set, each with its
-/// strength of regularisation by exact leave-one-out; the best [`MEMBERS`](Tuned::MEMBERS), judged by
-/// leave-one-out, are averaged into one network, 400 neurons each. With `neurons` or `max_floats`
-/// given, the best alone is taken. Inputs are [`Features::SumDifference`] unless said otherwise.
+/// **Few measurements** (up to [`Tuned::MANY`]): sine neurons with random frequencies. The scales of
+/// the inputs are tried from a fixed low-discrepancy set, each with its strength of regularisation by
+/// exact leave-one-out; the best [`MEMBERS`](Tuned::MEMBERS), judged by their
+/// [evidence](elm::validate::Validator::log_evidence) for RMSE and by leave-one-out for other metrics,
+/// are averaged into one network, 400 neurons each. With `neurons` or `max_floats` given, the best
+/// alone is taken. Inputs are [`Features::SumDifference`] unless said otherwise.
 ///
 /// **Many measurements**: inputs and scales by a search on part of the rows, judged on others; then
 /// more neurons than wanted are drawn and the less useful are [pruned](elm::prune); then one solve on

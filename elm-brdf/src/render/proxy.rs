@@ -10,7 +10,7 @@ const VIEWS: usize = 16;
 /// Steps in theta_i, from the normal to the horizon.
 const THETAS: usize = 24;
 /// Steps in the azimuth between both directions, from 0 to pi.
-const PHIS: usize = 16;
+const PHIS: usize = 32;
 /// Share of the directions that are drawn by the cosine alone, so that what the table missed is
 /// found as well.
 const COSINE_SHARE: f64 = 0.1;

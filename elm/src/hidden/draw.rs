@@ -21,6 +21,11 @@ pub enum Distribution {
     Uniform,
     /// Normal with mean 0 and variance 1.
     Normal,
+    /// Multivariate Student $t$ with so many degrees of freedom $\nu$, at least 1: the normal weights
+    /// of a neuron (not its bias) divided by one $\sqrt{\chi^2_\nu / \nu}$, so that some neurons are
+    /// much steeper than most. Sine neurons with $\nu$ of 3 or 5 are random features of Matérn's
+    /// covariance 3/2 or 5/2 (Rahimi and Recht, 2007).
+    StudentT(u8),
 }
 
 impl Distribution {
@@ -30,6 +35,7 @@ impl Distribution {
         match self {
             Self::Uniform => "uniform",
             Self::Normal => "normal",
+            Self::StudentT(_) => "student-t",
         }
     }
 }
@@ -214,18 +220,33 @@ impl<A: Scalar> Plan<A> {
         stream: u64,
         mut random: ChaCha8Rng,
     ) -> (Array2<A>, Array1<A>) {
-        let shape = (group.count, x.ncols() + 1);
-        let draws: Array2<f64> = match self.distribution {
+        let inputs = x.ncols();
+        // Of a neuron one row: its weights, its bias, and what chi-square is made of.
+        let more = match self.distribution {
+            Distribution::StudentT(freedom) => usize::from(freedom),
+            _ => 0,
+        };
+        let shape = (group.count, inputs + 1 + more);
+        let mut draws: Array2<f64> = match self.distribution {
             Distribution::Uniform => Array2::random_using(shape, StandardUniform, &mut random)
                 .mapv_into(|unit: f64| 2.0 * unit - 1.0),
-            Distribution::Normal => Array2::random_using(shape, StandardNormal, &mut random),
+            Distribution::Normal | Distribution::StudentT(_) => {
+                Array2::random_using(shape, StandardNormal, &mut random)
+            }
         };
+        if more > 0 {
+            for mut row in draws.rows_mut() {
+                let squares: f64 = row.iter().skip(inputs + 1).map(|z| z * z).sum();
+                let root = (squares / more as f64).sqrt().max(f64::MIN_POSITIVE);
+                row.slice_mut(s![..inputs]).mapv_inplace(|z| z / root);
+            }
+        }
         let scale = self.scale * group.scale;
         // Laid out by rows, as the product reads it.
-        let weights = Array2::from_shape_fn((x.ncols(), group.count), |(input, neuron)| {
+        let weights = Array2::from_shape_fn((inputs, group.count), |(input, neuron)| {
             A::from_f64(draws[[neuron, input]] * scale * self.input_scale(input))
         });
-        let drawn = |scale: f64| draws.column(x.ncols()).mapv(|b| A::from_f64(b * scale));
+        let drawn = |scale: f64| draws.column(inputs).mapv(|b| A::from_f64(b * scale));
         let biases = match group.biases {
             Biases::AsWeights => drawn(scale),
             Biases::Scaled(scale) => drawn(scale),

@@ -39,7 +39,7 @@ pub(super) fn allowed<A: Scalar>(lambda: f64) -> bool {
 
 /// The ridge solution of a problem with at least as many rows as neurons, whose hidden-layer
 /// matrix need never be there as a whole; or nothing where its numbers are beyond this route: out
-/// of range, all zeros, or with means so far from the first rows that centring would cost digits.
+/// of range, all zeros, or with means so far from those of some rows that centring would cost digits.
 ///
 /// # Errors
 /// Those of making the rows.

@@ -16,7 +16,7 @@ use crate::scalar::Scalar;
 /// random start makes it the largest. That distance is taken from the next Ritz value, with a
 /// factor of 100 for what that one may be short of. Eigenvalues that agree so nearly that the
 /// iteration has not told them apart give one between them, to a hundred times the error above.
-pub(super) fn largest_eigenvalue<A: Scalar>(lower: &Array2<A>) -> Option<A> {
+pub(crate) fn largest_eigenvalue<A: Scalar>(lower: &Array2<A>) -> Option<A> {
     const STEPS: usize = 80;
     let n = lower.nrows();
     let steps = STEPS.min(n);

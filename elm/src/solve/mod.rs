@@ -27,10 +27,10 @@ mod diagnosis;
 pub(crate) mod frame;
 mod gram;
 mod inverse;
-mod lanczos;
+pub(crate) mod lanczos;
 pub(crate) mod moments;
 mod pseudo_inverse;
-mod ridge;
+pub(crate) mod ridge;
 pub(crate) mod spectrum;
 
 use std::fmt;
@@ -343,7 +343,7 @@ impl From<Ridge> for Solver {
     }
 }
 
-fn in_range<A: Scalar>(mut solution: Solution<A>) -> Result<Solution<A>> {
+pub(crate) fn in_range<A: Scalar>(mut solution: Solution<A>) -> Result<Solution<A>> {
     let finite = |x: &A| x.is_finite();
     if solution.beta.iter().all(finite) && solution.intercept.iter().all(finite) {
         solution.diagnosis.saturate();

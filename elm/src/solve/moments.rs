@@ -84,6 +84,8 @@ pub(crate) struct RowSource<'a, A: Scalar> {
 /// Bytes in a tile: it stays in the second-level or third-level cache between being written and
 /// being multiplied, and has enough rows that adding its product to the sums costs little.
 const TILE_BYTES: usize = 1 << 21;
+/// Places that the rows for a first guess at the means come from.
+const RUNS: usize = 64;
 
 impl<A: Scalar> RowSource<'_, A> {
     pub(crate) fn rows(&self) -> usize {
@@ -184,14 +186,20 @@ impl<A: Scalar> Moments<A> {
         let mut tile = vec![A::zero(); tile_rows * width];
         let mut shift = vec![A::zero(); neurons + outputs];
         let mut sums = Array2::zeros((width, width).f());
+        if source.intercept {
+            // Of rows from everywhere, as the first may be unlike the rest.
+            let mut roots = Vec::with_capacity(tile_rows);
+            for run in spread_runs(rows, tile_rows) {
+                let to = &mut tile[roots.len() * width..][..run.len() * width];
+                source.write(run.clone(), &frame, &shift, to)?;
+                roots.extend(frame.root_weights.slice(s![run]));
+            }
+            shift = centre_of(&tile, width, &roots);
+        }
         for first in (0..rows).step_by(tile_rows) {
             let range = first..rows.min(first + tile_rows);
             let tile = &mut tile[..range.len() * width];
-            source.write(range.clone(), &frame, &shift, tile)?;
-            if first == 0 && source.intercept {
-                shift = centre_of(tile, width, &frame.root_weights);
-                source.write(range, &frame, &shift, tile)?;
-            }
+            source.write(range, &frame, &shift, tile)?;
             if let Ok(tile) = ArrayView2::from_shape((tile.len() / width, width), tile) {
                 A::add_gram(tile, &mut sums);
             }
@@ -300,10 +308,22 @@ impl<A: Scalar> Moments<A> {
     }
 }
 
-/// A value near each column's mean over a tile that has not been shifted; for a column that is
+/// Ranges of `wanted` of the rows in all, evenly spread: all of them where there are no more.
+fn spread_runs(rows: usize, wanted: usize) -> impl Iterator<Item = Range<usize>> {
+    let runs = if rows > wanted { RUNS.min(wanted) } else { 1 };
+    let length = wanted.min(rows) / runs.max(1);
+    let last = rows - length;
+    (0..runs).map(move |run| {
+        // Of the first run and the last the ends are those of all rows.
+        let first = (last as u128 * run as u128 / (runs.max(2) - 1) as u128) as usize;
+        first..first + length
+    })
+}
+
+/// A value near each column's weighted mean over a tile that has not been shifted; for a column that is
 /// constant there, its value to the last bit, so that what is left of it is 0. The last column, of
 /// ones, is left out.
-fn centre_of<A: Scalar>(tile: &[A], width: usize, roots: &Array1<A>) -> Vec<A> {
+fn centre_of<A: Scalar>(tile: &[A], width: usize, roots: &[A]) -> Vec<A> {
     let mut rows = tile
         .chunks_exact(width)
         .zip(roots)
@@ -312,15 +332,52 @@ fn centre_of<A: Scalar>(tile: &[A], width: usize, roots: &Array1<A>) -> Vec<A> {
     let Some((first, &first_root)) = rows.next() else {
         return sums;
     };
-    let mut count = A::one();
+    let mut total = first_root * first_root;
     for (row, &root) in rows {
-        count += A::one();
+        let weight = root * root;
+        total += weight;
         for ((sum, &value), &first) in sums.iter_mut().zip(row).zip(first) {
-            *sum += value / root - first / first_root;
+            *sum += weight * (value / root - first / first_root);
         }
     }
     sums.iter()
         .zip(first)
-        .map(|(&sum, &first)| first / first_root + sum / count)
+        .map(|(&sum, &first)| first / first_root + sum / total)
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::{Array1, Array2};
+
+    use super::{HiddenRows, Moments, RowSource, spread_runs};
+
+    #[test]
+    fn runs_are_spread_over_all_rows_and_hold_as_many_as_wanted() {
+        for (rows, wanted) in [(1, 1), (5, 8), (1000, 1000), (1001, 1000), (20_000, 1024)] {
+            let runs: Vec<_> = spread_runs(rows, wanted).collect();
+            let held: usize = runs.iter().map(ExactSizeIterator::len).sum();
+            assert!(held <= wanted.min(rows) && 2 * held >= wanted.min(rows));
+            assert_eq!((runs[0].start, runs[runs.len() - 1].end), (0, rows));
+        }
+    }
+
+    #[test]
+    fn columns_are_shifted_near_their_weighted_means_whatever_the_order_of_the_rows() {
+        // Sorted rows, the last of which count a thousand times as much as the first.
+        let rows = 30_000;
+        let place = |row: usize| row as f64 / rows as f64;
+        let hidden = Array2::from_shape_fn((rows, 3), |(row, j)| (place(row) + j as f64).sin());
+        let targets = Array2::from_shape_fn((rows, 1), |(row, _)| place(row));
+        let weights = Array1::from_shape_fn(rows, |row| 1000.0_f64.powf(place(row)));
+        let mut source = RowSource {
+            hidden: HiddenRows::Matrix(hidden.view()),
+            targets: targets.view(),
+            weights: Some(weights.view()),
+            intercept: true,
+        };
+        let moments = Moments::gather(&mut source).unwrap();
+        let largest = moments.gram.diag().fold(0.0, |m: f64, &d| m.max(d));
+        assert!(moments.correction < 0.01 * largest);
+    }
 }

@@ -320,7 +320,8 @@ fn unit_roundoff<A: Scalar>() -> f64 {
     A::epsilon().as_f64() / 2.0
 }
 
-fn answer<A: Scalar>(
+/// The solution at these relative strengths, one per output.
+pub(crate) fn answer<A: Scalar>(
     spectrum: &Spectrum<A>,
     reason: Reason,
     lambda: &[f64],

@@ -1,15 +1,17 @@
-//! Few measurements: every candidate by exact leave-one-out, the best of them averaged.
+//! Few measurements: every candidate by its evidence, the best of them averaged.
+
+use std::f64::consts::PI;
 
 use elm::solve::{LeastSquares, Ridge};
 use elm::validate::Validator;
-use elm::{Elm, ElmParams, HiddenLayer, Scaler};
+use elm::{Activation, Biases, Distribution, Elm, ElmParams, HiddenLayer, Scaler};
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, concatenate};
 
-use super::{Blank, Tuned, provenance, solve};
+use super::{Blank, Tuned, provenance};
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::geometry::Pair;
-use crate::link::Link;
+use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
 use crate::model::{BrdfModel, Layer, Provenance};
 use crate::scales::spread;
@@ -17,9 +19,11 @@ use crate::scales::spread;
 /// Neurons of a candidate.
 const NEURONS: usize = 400;
 /// Candidates for the scales of inputs, per set of inputs.
-const CANDIDATES: usize = 64;
+const CANDIDATES: usize = 128;
 /// Scales tried, in units of the inputs' standard deviations: from nearly linear to several waves.
 const SCALES: (f64, f64) = (0.05, 3.3);
+/// Degrees of freedom of the frequencies: those of Matérn's covariance 5/2.
+const FREEDOM: u8 = 5;
 
 /// One model for each group of channels.
 pub(super) fn fit(
@@ -30,16 +34,24 @@ pub(super) fn fit(
 ) -> Result<Vec<BrdfModel>> {
     let link = Link::default_log();
     let targets = link.fit(values)?.to_targets(values)?;
-    let channels = groups.iter().map(Vec::len).max().unwrap_or(1);
-    let search = Search::new(tuned, pairs, &targets, channels)?;
-    let choose = |group: &Vec<usize>| search.choose(tuned, pairs, values, &targets, group);
-    let choices: Vec<Choice> = groups.iter().map(choose).collect::<Result<_>>()?;
+    let groups: Vec<Group> = groups
+        .iter()
+        .map(|channels| Group::new(channels, values))
+        .collect::<Result<_>>()?;
+    let channels = groups.iter().map(|g| g.channels.len()).max().unwrap_or(1);
+    let search = Search::new(tuned, pairs, channels)?;
+    let scores = search.scores(tuned.metric, pairs, &targets, &groups)?;
+    let choices: Vec<Vec<usize>> = scores
+        .columns()
+        .into_iter()
+        .map(|scores| search.best(scores))
+        .collect();
     // One factorisation of a candidate serves every group that has taken it.
     let mut networks = Vec::new();
-    for candidate in 0..search.scales.nrows() {
-        let takes = |choice: &Choice| choice.members.contains(&candidate);
-        let taken = groups.iter().zip(&choices).filter(|(_, c)| takes(c));
-        let mut columns: Vec<usize> = taken.flat_map(|(group, _)| group.clone()).collect();
+    for candidate in 0..CANDIDATES {
+        let taken = groups.iter().zip(&choices);
+        let taken = taken.filter(|(_, members)| members.contains(&candidate));
+        let mut columns: Vec<usize> = taken.flat_map(|(g, _)| g.channels.clone()).collect();
         columns.sort_unstable();
         columns.dedup();
         networks.push(if columns.is_empty() {
@@ -49,25 +61,53 @@ pub(super) fn fit(
         });
     }
     let about = provenance(tuned.seed, tuned.metric, pairs, values);
-    let model = |(group, choice): (&Vec<usize>, Choice)| {
-        let link = link.fit(values.select(Axis(1), group).view())?;
-        let taken = choice.members.iter().filter_map(|&c| networks[c].as_ref());
+    let model = |(group, members): (&Group, Vec<usize>)| {
+        let taken = members.iter().filter_map(|&c| networks[c].as_ref());
         let taken: Vec<&Network> = taken.collect();
-        let (layer, network) = average(&search.scaler, &taken, group)?;
+        let (layer, network) = average(&search.scaler, &taken, &group.channels)?;
+        let share = 1.0 / taken.len() as f64;
+        let mut left_out = Array2::zeros(group.values.dim());
+        for network in taken {
+            left_out.scaled_add(share, &network.of(&network.left_out, &group.channels));
+        }
         let about = Provenance {
-            held_out: Some(choice.held_out),
+            held_out: Some(group.metrics(pairs, &targets, &left_out)?),
             ..about.clone()
         };
+        let link = group.link.clone();
         Ok(BrdfModel::new(search.set, link, layer, network).with_provenance(about))
     };
     groups.iter().zip(choices).map(model).collect()
 }
 
-/// The networks that a group of channels is best fitted by.
-struct Choice {
-    /// Numbers of candidates.
-    members: Vec<usize>,
-    held_out: Metrics,
+/// Channels that one network is for.
+struct Group {
+    channels: Vec<usize>,
+    values: Array2<f64>,
+    link: FittedLink,
+}
+
+impl Group {
+    fn new(channels: &[usize], values: ArrayView2<'_, f64>) -> Result<Self> {
+        let values = values.select(Axis(1), channels);
+        Ok(Self {
+            channels: channels.to_vec(),
+            link: Link::default_log().fit(values.view())?,
+            values,
+        })
+    }
+
+    /// Errors where the targets of this group's channels are missed by `residuals`.
+    fn metrics(
+        &self,
+        pairs: &[Pair],
+        targets: &Array2<f64>,
+        residuals: &Array2<f64>,
+    ) -> Result<Metrics> {
+        let targets = targets.select(Axis(1), &self.channels);
+        let predicted = self.link.to_values(targets - residuals)?;
+        Metrics::of(pairs, predicted.view(), self.values.view())
+    }
 }
 
 /// A candidate fitted to some of the channels.
@@ -77,61 +117,100 @@ struct Network {
     columns: Vec<usize>,
     beta: Array2<f64>,
     intercept: Array1<f64>,
+    /// What leave-one-out misses the targets by.
+    left_out: Array2<f64>,
 }
 
-/// All candidates with what leave-one-out predicts.
+impl Network {
+    /// Of a matrix with a column for each of the network's channels those of these.
+    fn of(&self, matrix: &Array2<f64>, channels: &[usize]) -> Array2<f64> {
+        let place = |channel: &usize| self.columns.iter().position(|c| c == channel);
+        let columns: Vec<usize> = channels.iter().filter_map(place).collect();
+        matrix.select(Axis(1), &columns)
+    }
+}
+
+/// What is common to all candidates.
 struct Search {
     set: Features,
     scaler: Scaler<f64>,
     x: Array2<f64>,
-    /// Scales of inputs, shape (candidates, inputs).
-    scales: Array2<f64>,
     params: Vec<ElmParams<f64>>,
-    /// For each candidate the residuals of targets, shape (rows, channels).
-    left_out: Vec<Array2<f64>>,
     members: usize,
 }
 
 impl Search {
-    fn new(tuned: &Tuned, pairs: &[Pair], targets: &Array2<f64>, channels: usize) -> Result<Self> {
+    fn new(tuned: &Tuned, pairs: &[Pair], channels: usize) -> Result<Self> {
         let set = tuned.features.unwrap_or(Features::SumDifference);
         let x = set.compute(pairs);
-        let scaler = Scaler::measured(&x)?;
         let neurons = tuned.size(NEURONS, x.ncols(), channels, 2, |_| 0)?;
         let limited = tuned.neurons.is_some() || tuned.max_floats.is_some();
-        let scales = spread(CANDIDATES, x.ncols(), SCALES);
-        let params = |scales: ArrayView1<'_, f64>| tuned.waves(neurons, &scales.to_vec());
-        let mut search = Self {
-            set,
-            scaler,
-            x,
-            params: scales.rows().into_iter().map(params).collect(),
-            scales,
-            left_out: Vec::new(),
-            members: if limited { 1 } else { Tuned::MEMBERS },
+        let params = |scales: ArrayView1<'_, f64>| {
+            ElmParams::new(neurons)
+                .activation(Activation::Sine)
+                .distribution(Distribution::StudentT(FREEDOM))
+                .biases(Biases::Scaled(PI))
+                .input_scales(scales.to_vec())
+                .seed(tuned.seed)
         };
-        for candidate in 0..CANDIDATES {
-            let (_, h) = search.layer(candidate)?;
-            let validator = Validator::new(&LeastSquares::new(&h, targets)?.intercept(true))?;
-            let lambda = validator.strengths(Ridge::leave_one_out())?;
-            search
-                .left_out
-                .push(match validator.leave_one_out(&lambda) {
-                    Ok(held_out) => held_out.residuals().to_owned(),
-                    // One measurement: nothing can be left out of it.
-                    Err(elm::Error::Undetermined { .. }) => targets.clone(),
-                    Err(error) => return Err(error.into()),
-                });
-        }
-        Ok(search)
+        let scales = spread(CANDIDATES, x.ncols(), SCALES);
+        Ok(Self {
+            set,
+            scaler: Scaler::measured(&x)?,
+            params: scales.rows().into_iter().map(params).collect(),
+            x,
+            members: if limited { 1 } else { Tuned::MEMBERS },
+        })
     }
 
-    /// A candidate's layer and its matrix.
-    fn layer(&self, candidate: usize) -> Result<(Blank, Array2<f64>)> {
+    /// How bad each candidate is for each group, shape (candidates, groups).
+    fn scores(
+        &self,
+        metric: Metric,
+        pairs: &[Pair],
+        targets: &Array2<f64>,
+        groups: &[Group],
+    ) -> Result<Array2<f64>> {
+        let mut scores = Array2::zeros((CANDIDATES, groups.len()));
+        for (candidate, mut scores) in scores.rows_mut().into_iter().enumerate() {
+            let (_, validator) = self.validator(candidate, targets)?;
+            // A few bright rows decide the RMSE, and would decide which candidate is taken; the
+            // evidence of targets, which are all of one size, chooses better.
+            if metric == Metric::Rmse {
+                let evidence = most_evidence(&validator);
+                for (score, group) in scores.iter_mut().zip(groups) {
+                    *score = -evidence.select(Axis(0), &group.channels).sum();
+                }
+            } else {
+                let (_, left_out) = leave_one_out(&validator, targets)?;
+                for (score, group) in scores.iter_mut().zip(groups) {
+                    let residuals = left_out.select(Axis(1), &group.channels);
+                    *score = metric.of(&group.metrics(pairs, targets, &residuals)?);
+                }
+            }
+        }
+        Ok(scores)
+    }
+
+    /// The candidates that a group takes, the best first.
+    fn best(&self, scores: ArrayView1<'_, f64>) -> Vec<usize> {
+        let mut ranked: Vec<usize> = (0..scores.len()).collect();
+        ranked.sort_by(|&a, &b| scores[a].total_cmp(&scores[b]));
+        ranked.truncate(self.members);
+        ranked
+    }
+
+    /// A candidate's layer, and its matrix factorised.
+    fn validator(
+        &self,
+        candidate: usize,
+        targets: &Array2<f64>,
+    ) -> Result<(Blank, Validator<f64>)> {
         let params = self.params[candidate].clone();
         let blank = Blank::new(params, self.x.ncols(), &self.scaler)?;
         let h = blank.matrix(&self.x)?;
-        Ok((blank, h))
+        let validator = Validator::new(&LeastSquares::new(&h, targets)?.intercept(true))?;
+        Ok((blank, validator))
     }
 
     fn network(
@@ -140,56 +219,48 @@ impl Search {
         targets: &Array2<f64>,
         columns: Vec<usize>,
     ) -> Result<Network> {
-        let (blank, h) = self.layer(candidate)?;
         let targets = targets.select(Axis(1), &columns);
-        let (beta, intercept) = solve(&h, &targets, None, Ridge::leave_one_out())?;
+        let (blank, validator) = self.validator(candidate, &targets)?;
+        let (lambda, left_out) = leave_one_out(&validator, &targets)?;
+        let solution = validator.solve(&lambda)?;
         Ok(Network {
             blank,
             columns,
-            beta,
-            intercept,
+            beta: solution.beta,
+            intercept: solution.intercept,
+            left_out,
         })
     }
+}
 
-    fn choose(
-        &self,
-        tuned: &Tuned,
-        pairs: &[Pair],
-        values: ArrayView2<'_, f64>,
-        targets: &Array2<f64>,
-        group: &[usize],
-    ) -> Result<Choice> {
-        let truth = values.select(Axis(1), group);
-        let targets = targets.select(Axis(1), group);
-        let link = Link::default_log().fit(truth.view())?;
-        let metrics = |residuals: &Array2<f64>| -> Result<Metrics> {
-            let predicted = link.to_values(&targets - residuals)?;
-            Metrics::of(pairs, predicted.view(), truth.view())
+/// Log evidence of each channel at the strength where that is largest.
+fn most_evidence(validator: &Validator<f64>) -> Array1<f64> {
+    let mut most = Array1::from_elem(validator.outputs(), f64::NEG_INFINITY);
+    for strength in Ridge::candidates() {
+        // One measurement: no evidence for anything.
+        let Ok(evidence) = validator.log_evidence(&[strength]) else {
+            break;
         };
-        // A few bright rows decide the RMSE, and would decide which candidate is taken; the errors
-        // of targets, which are all of one size, choose better (held out on CUReT by 5 %).
-        let score = |residuals: &Array2<f64>| -> Result<f64> {
-            Ok(match tuned.metric {
-                Metric::Rmse => residuals.iter().map(|r| r * r).sum(),
-                metric => metric.of(&metrics(residuals)?),
-            })
-        };
-        let mut ranked = Vec::new();
-        for (candidate, left_out) in self.left_out.iter().enumerate() {
-            let residuals = left_out.select(Axis(1), group);
-            ranked.push((score(&residuals)?, candidate));
-        }
-        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-        ranked.truncate(self.members);
-        let members: Vec<usize> = ranked.into_iter().map(|(_, candidate)| candidate).collect();
-        let share = 1.0 / members.len() as f64;
-        let mut mean = Array2::zeros(targets.dim());
-        for &member in &members {
-            mean.scaled_add(share, &self.left_out[member].select(Axis(1), group));
-        }
-        let held_out = metrics(&mean)?;
-        Ok(Choice { members, held_out })
+        most.zip_mut_with(&Array1::from(evidence), |most, &found| {
+            *most = most.max(found);
+        });
     }
+    most
+}
+
+/// The strengths that leave-one-out chooses, and what it misses the targets by.
+fn leave_one_out(
+    validator: &Validator<f64>,
+    targets: &Array2<f64>,
+) -> Result<(Vec<f64>, Array2<f64>)> {
+    let lambda = validator.strengths(Ridge::leave_one_out())?;
+    let residuals = match validator.leave_one_out(&lambda) {
+        Ok(held_out) => held_out.residuals().to_owned(),
+        // One measurement: nothing can be left out of it.
+        Err(elm::Error::Undetermined { .. }) => targets.clone(),
+        Err(error) => return Err(error.into()),
+    };
+    Ok((lambda, residuals))
 }
 
 /// One network, the mean of `networks`, for the channels of a group.
@@ -202,10 +273,9 @@ fn average(
     let mut betas = Vec::new();
     let mut intercept = Array1::zeros(group.len());
     for network in networks {
-        let place = |channel: &usize| network.columns.iter().position(|c| c == channel);
-        let columns: Vec<usize> = group.iter().filter_map(place).collect();
-        betas.push(network.beta.select(Axis(1), &columns) * share);
-        intercept.scaled_add(share, &network.intercept.select(Axis(0), &columns));
+        betas.push(network.of(&network.beta, group) * share);
+        let constants = network.intercept.view().insert_axis(Axis(0)).to_owned();
+        intercept.scaled_add(share, &network.of(&constants, group).row(0));
     }
     let views: Vec<_> = betas.iter().map(|beta| beta.view()).collect();
     // All neurons are sines, so that they stand in the order of the layers.

@@ -1,14 +1,14 @@
 //! Many measurements: a search on part of the rows, then pruning, then one solve on all of them.
 
+use elm::Scaler;
 use elm::prune::Keep;
 use elm::solve::Ridge;
-use elm::{Elm, Scaler};
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 use rand::SeedableRng;
 use rand::seq::index;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Blank, Tuned, provenance, solve, without_weights};
+use super::{Blank, Tuned, provenance};
 use crate::error::Result;
 use crate::features::Features;
 use crate::geometry::Pair;
@@ -59,22 +59,24 @@ pub(super) fn fit(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) ->
     let count = drawn(neurons);
     let few = &rows[..rows.len().min(PRUNE_ROWS.max(count))];
     let params = tuned.waves(count, &setting.scales);
-    let pruned = params.clone().solver(Ridge::relative(RIDGE)).fit_pruned(
+    let mut blank = Blank::new(params.clone(), x.ncols(), &scaler)?;
+    let params = params.solver(Ridge::relative(RIDGE));
+    let pruned = params.fit_pruned(
         &x.select(Axis(0), few),
         &targets.select(Axis(0), few),
         Keep::Neurons(neurons),
     )?;
-    let mut blank = Blank::new(params, x.ncols(), &scaler)?;
     let mut kept = vec![false; count];
     for &number in &pruned.kept {
         kept[number] = true;
     }
     blank.draw.kept = Some(kept);
     let hidden = blank.network.hidden().subset(&pruned.kept)?;
-    let h = without_weights(&scaler, hidden.clone())?.hidden_matrix(&x)?;
     let weights = row_weights(tuned.metric, pairs, values, &link);
-    let (beta, intercept) = solve(&h, &targets, weights.as_ref(), Ridge::relative(RIDGE))?;
-    let network = Elm::from_parts(Some(scaler), hidden, beta, intercept)?;
+    let weights = weights.as_ref().map(|weights| weights.view());
+    let network = params
+        .check()?
+        .fit_layer(Some(scaler), hidden, &x, &targets, weights)?;
     let mut about = provenance(tuned.seed, tuned.metric, pairs, values);
     about.held_out = Some(setting.held_out);
     let layer = Layer::Drawn(vec![blank.draw]);
@@ -208,12 +210,15 @@ impl Search<'_> {
 
     fn try_scales(&self, inputs: &Inputs, scales: Vec<f64>) -> Result<Setting> {
         let params = self.tuned.waves(SEARCH_NEURONS, &scales);
-        let blank = Blank::new(params, scales.len(), &inputs.scaler)?;
-        let h = blank.matrix(&inputs.fitted)?;
-        let ridge = Ridge::relative(RIDGE);
-        let (beta, constant) = solve(&h, &self.fitted.targets, None, ridge)?;
-        let targets = blank.matrix(&inputs.judged)?.dot(&beta) + &constant;
-        let predicted = self.link.to_values(targets)?;
+        let params = params.solver(Ridge::relative(RIDGE)).check()?;
+        let network = params.fit_layer(
+            Some(inputs.scaler.clone()),
+            params.hidden_layer(scales.len())?,
+            &inputs.fitted,
+            &self.fitted.targets,
+            None,
+        )?;
+        let predicted = self.link.to_values(network.predict(&inputs.judged)?)?;
         let truth = self.judged.values.view();
         Ok(Setting {
             set: inputs.set,

@@ -1,0 +1,344 @@
+//! Settings that are in range, and what can be done with them.
+
+use ndarray::{Array2, ArrayRef2, ArrayView1, ArrayView2};
+
+use super::{ElmParams, Targets};
+use crate::error::{Error, Result};
+use crate::hidden::{HiddenLayer, Neurons};
+use crate::network::{Elm, design};
+use crate::predictor::LayerRows;
+use crate::scalar::Scalar;
+use crate::scaler::Scaler;
+use crate::solve::moments::{HiddenRows, RowSource};
+use crate::solve::{
+    LeastSquares, Solver, check_length, check_matrix, check_room, check_some_weight,
+};
+use crate::validate::{FoldFit, HeldOut, Validator};
+
+/// Settings that are in range; made by [`ElmParams::check`].
+///
+/// ```
+/// use elm::{ElmParams, Error, validate::assign_folds};
+/// use ndarray::{Array1, Axis};
+///
+/// let refused = ElmParams::<f64>::new(0).check();
+/// assert!(matches!(refused, Err(Error::Parameter { name: "neurons", .. })));
+///
+/// let x = Array1::linspace(-3.0, 3.0, 60).insert_axis(Axis(1));
+/// let t = x.mapv(f64::sin);
+/// let params = ElmParams::new(20).check()?;
+/// let folds = assign_folds(60, 10, 1)?;
+/// let held_out = params.cross_validate(&x, &t, &folds)?;
+/// assert!(held_out.rmse()[0] < 1e-2);
+/// # Ok::<(), elm::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct CheckedParams<A: Scalar>(pub(super) ElmParams<A>);
+
+impl<A: Scalar> CheckedParams<A> {
+    /// Draws the hidden layer and solves for the output weights.
+    ///
+    /// `x` has shape (rows, inputs); `t` has shape (rows, outputs), or (rows) for one output.
+    ///
+    /// # Errors
+    /// [`Error::Empty`], [`Error::Shape`] and [`Error::NotFinite`] for the data,
+    /// [`Error::TooLarge`] for more neurons than memory holds, and those of [`Solver::solve`].
+    pub fn fit<T: Targets<A>>(&self, x: &ArrayRef2<A>, t: &T) -> Result<Elm<A>> {
+        self.fit_weighted(x, t, None)
+    }
+
+    /// As [`fit`](Self::fit), with a weight for the squared residual of each row.
+    ///
+    /// Standardisation does not use the weights.
+    ///
+    /// # Errors
+    /// Those of [`fit`](Self::fit) and [`LeastSquares::weights`].
+    pub fn fit_weighted<T: Targets<A>>(
+        &self,
+        x: &ArrayRef2<A>,
+        t: &T,
+        weights: Option<ArrayView1<'_, A>>,
+    ) -> Result<Elm<A>> {
+        let t = t.as_matrix();
+        let (scaler, hidden) = self.prepare(x.view(), t)?;
+        self.output_weights(scaler, hidden, x.view(), t, weights)
+    }
+
+    /// Solves for the output weights of a layer that is there already: drawn by
+    /// [`hidden_layer`](Self::hidden_layer), [pruned](HiddenLayer::subset),
+    /// [joined](HiddenLayer::joined). `scaler` is what the layer takes its inputs to be standardised
+    /// by. Of these settings the solver, the intercept and the direct links count.
+    ///
+    /// The hidden-layer matrix is never there as a whole where [`Ridge`](crate::solve::Ridge) of a given
+    /// strength allows that.
+    ///
+    /// ```
+    /// use elm::{ElmParams, Scaler, solve::Ridge};
+    /// use ndarray::{Array1, Axis};
+    ///
+    /// let x = Array1::linspace(-3.0, 3.0, 60).insert_axis(Axis(1));
+    /// let t = x.mapv(f64::sin);
+    /// let params = ElmParams::new(40).solver(Ridge::relative(1e-6)).check()?;
+    /// let half: Vec<usize> = (0..40).step_by(2).collect();
+    /// let layer = params.hidden_layer(1)?.subset(&half)?;
+    /// let model = params.fit_layer(Some(Scaler::measured(&x)?), layer, &x, &t, None)?;
+    /// assert_eq!(model.hidden().neurons(), 20);
+    /// # Ok::<(), elm::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`fit_weighted`](Self::fit_weighted); [`Error::Shape`] for a layer or a scaler of
+    /// another number of inputs.
+    pub fn fit_layer<T: Targets<A>>(
+        &self,
+        scaler: Option<Scaler<A>>,
+        hidden: HiddenLayer<A>,
+        x: &ArrayRef2<A>,
+        t: &T,
+        weights: Option<ArrayView1<'_, A>>,
+    ) -> Result<Elm<A>> {
+        let t = t.as_matrix();
+        check_matrix("inputs", x.view())?;
+        check_matrix("targets", t)?;
+        check_length("rows of targets", t.nrows(), x.nrows())?;
+        check_length("inputs of the layer", hidden.inputs(), x.ncols())?;
+        if let Some(scaler) = &scaler {
+            check_length("inputs of the scaler", scaler.mean().len(), x.ncols())?;
+        }
+        let neurons = hidden.neurons();
+        check_room("the hidden-layer matrix", x.nrows().min(neurons), neurons)?;
+        self.output_weights(scaler, hidden, x.view(), t, weights)
+    }
+
+    /// The solution for a layer and data that go together.
+    fn output_weights(
+        &self,
+        scaler: Option<Scaler<A>>,
+        hidden: HiddenLayer<A>,
+        x: ArrayView2<'_, A>,
+        t: ArrayView2<'_, A>,
+        weights: Option<ArrayView1<'_, A>>,
+    ) -> Result<Elm<A>> {
+        if let Some(weights) = &weights {
+            check_some_weight(weights.view(), x.nrows())?;
+        }
+        let links = self.0.direct_links;
+        let layer = LayerRows::new(&hidden, scaler.as_ref(), links, x);
+        let mut source = RowSource {
+            hidden: HiddenRows::Layer(Box::new(layer)),
+            targets: t,
+            weights,
+            intercept: self.has_intercept(),
+        };
+        let solution = match self.0.solver.solve_rows(&mut source)? {
+            Some(solution) => solution,
+            None => {
+                let design = self.design(x, scaler.as_ref(), &hidden)?;
+                let problem = self.problem(&design, t, weights.as_ref())?;
+                self.0.solver.solve(&problem)?
+            }
+        };
+        Ok(Elm::assemble(scaler, hidden, links, solution))
+    }
+
+    /// The random layer alone, for this many inputs: what a [`fit`](Self::fit) draws. Whoever keeps
+    /// these settings need keep no weights of it; see [`Elm::from_parts`].
+    ///
+    /// # Errors
+    /// [`Error::Empty`] without inputs, [`Error::Shape`] for another number of input scales,
+    /// [`Error::TooLarge`]; [`Error::Conflict`] for neurons that are laid on training rows
+    /// ([`Biases::OnData`](crate::Biases::OnData), [`Kind::Radial`](crate::Kind::Radial)), as there are none.
+    pub fn hidden_layer(&self, inputs: usize) -> Result<HiddenLayer<A>> {
+        if self.needs_rows() {
+            return Err(Error::Conflict {
+                first: "neurons laid on training rows",
+                second: "a layer without them",
+            });
+        }
+        let nowhere = Array2::zeros((1, inputs));
+        check_matrix("inputs", nowhere.view())?;
+        self.layer(nowhere.view())
+    }
+
+    /// Held-out predictions for every row, from one random layer and one factorisation: `folds`
+    /// has one label per row, and rows of one label are predicted by the fit to all others.
+    ///
+    /// Ridge has the same strength in every fold, given or chosen on all rows, and inputs are
+    /// standardised on all rows; [`validate`](crate::validate) says what that leaks.
+    ///
+    /// # Errors
+    /// Those of [`fit`](Self::fit) for the data and of [`Validator::k_fold`];
+    /// [`Error::Conflict`] for [`Inverse`](crate::solve::Inverse), which cannot be fitted to fewer
+    /// rows, and for a pseudo-inverse with a cut-off of its own, which would fall elsewhere in
+    /// every fold.
+    pub fn cross_validate<T: Targets<A>>(
+        &self,
+        x: &ArrayRef2<A>,
+        t: &T,
+        folds: &[usize],
+    ) -> Result<HeldOut<A>> {
+        let (validator, lambda) = self.in_closed_form(x.view(), t.as_matrix())?;
+        validator.k_fold(folds, &lambda)
+    }
+
+    /// What the fit without each fold predicts for **every** row, those that it was fitted to
+    /// among them: as [`cross_validate`](Self::cross_validate), with the fits' training errors
+    /// beside the held-out ones. One entry per fold, in rising order of its label.
+    ///
+    /// # Errors
+    /// Those of [`cross_validate`](Self::cross_validate).
+    pub fn cross_fits<T: Targets<A>>(
+        &self,
+        x: &ArrayRef2<A>,
+        t: &T,
+        folds: &[usize],
+    ) -> Result<Vec<FoldFit<A>>> {
+        let (validator, lambda) = self.in_closed_form(x.view(), t.as_matrix())?;
+        validator.k_fold_fits(folds, &lambda)
+    }
+
+    /// The problem, factorised, and the strengths of its solver.
+    fn in_closed_form(
+        &self,
+        x: ArrayView2<'_, A>,
+        t: ArrayView2<'_, A>,
+    ) -> Result<(Validator<A>, Vec<f64>)> {
+        let conflict = |first| {
+            Err(Error::Conflict {
+                first,
+                second: "validation in closed form",
+            })
+        };
+        let ridge = match self.0.solver {
+            Solver::Inverse(_) => return conflict("the solver 'inverse'"),
+            Solver::PseudoInverse(solver) if solver.cutoff().is_some() => {
+                return conflict("a cut-off of the pseudo-inverse");
+            }
+            Solver::PseudoInverse(_) => None,
+            Solver::Ridge(ridge) => Some(ridge),
+        };
+        let validator = self.validator(x, t)?;
+        let lambda = match ridge {
+            Some(ridge) => validator.strengths(ridge)?,
+            None => vec![0.0],
+        };
+        Ok((validator, lambda))
+    }
+
+    /// Draws the layer, applies it, and factorises.
+    pub(crate) fn validator(
+        &self,
+        x: ArrayView2<'_, A>,
+        t: ArrayView2<'_, A>,
+    ) -> Result<Validator<A>> {
+        let design = self.draw(x, t)?.design;
+        Validator::new(&self.problem(&design, t, None)?)
+    }
+
+    /// Checks the data, draws the layer and applies it.
+    pub(crate) fn draw(&self, x: ArrayView2<'_, A>, t: ArrayView2<'_, A>) -> Result<Drawn<A>> {
+        let (scaler, hidden) = self.prepare(x, t)?;
+        let design = self.design(x, scaler.as_ref(), &hidden)?;
+        Ok(Drawn {
+            scaler,
+            hidden,
+            design,
+        })
+    }
+
+    /// Checks the data and draws the layer.
+    fn prepare(
+        &self,
+        x: ArrayView2<'_, A>,
+        t: ArrayView2<'_, A>,
+    ) -> Result<(Option<Scaler<A>>, HiddenLayer<A>)> {
+        check_matrix("inputs", x)?;
+        check_matrix("targets", t)?;
+        check_length("rows of targets", t.nrows(), x.nrows())?;
+
+        // Asked before anything is drawn, as a failed allocation would abort the program. Where rows
+        // outnumber neurons the matrix itself may not be needed.
+        let neurons = self.0.neurons();
+        check_room("the hidden-layer matrix", x.nrows().min(neurons), neurons)?;
+        let scaler = self.0.standardise.then(|| Scaler::measure(x));
+        let hidden = match &scaler {
+            Some(scaler) if self.needs_rows() => self.layer(scaler.transform(x).view())?,
+            _ => self.layer(x)?,
+        };
+        Ok((scaler, hidden))
+    }
+
+    /// The hidden-layer matrix, with the inputs beside it where they are linked directly.
+    fn design(
+        &self,
+        x: ArrayView2<'_, A>,
+        scaler: Option<&Scaler<A>>,
+        hidden: &HiddenLayer<A>,
+    ) -> Result<Array2<A>> {
+        check_room("the hidden-layer matrix", x.nrows(), hidden.neurons())?;
+        let scaled = scaler.map(|scaler| scaler.transform(x));
+        let x = scaled.as_ref().map_or(x, |scaled| scaled.view());
+        Ok(design(hidden, self.0.direct_links, x))
+    }
+
+    pub(crate) fn problem<'a>(
+        &self,
+        design: &'a Array2<A>,
+        t: ArrayView2<'a, A>,
+        weights: Option<&'a ArrayView1<'_, A>>,
+    ) -> Result<LeastSquares<'a, A>> {
+        let problem = LeastSquares::of_views(design.view(), t)?.intercept(self.has_intercept());
+        match weights {
+            Some(weights) => problem.weights(weights),
+            None => Ok(problem),
+        }
+    }
+
+    /// The random layer for these (standardised) rows.
+    pub(crate) fn layer(&self, x: ArrayView2<'_, A>) -> Result<HiddenLayer<A>> {
+        let params = &self.0;
+        // A failed allocation would abort the program.
+        let per_neuron = x.ncols().saturating_add(1);
+        check_room("the hidden layer", per_neuron, params.neurons())?;
+        if !params.input_scales.is_empty() {
+            check_length("input scales", params.input_scales.len(), x.ncols())?;
+        }
+        Ok(params.plan().draw(x))
+    }
+
+    /// Whether the layer takes more of the rows than the number of their inputs.
+    pub(crate) fn needs_rows(&self) -> bool {
+        self.0.groups().any(Neurons::need_rows)
+    }
+
+    /// Equation 10 has no room for a constant; asking for both explicitly is an error later.
+    pub(crate) fn has_intercept(&self) -> bool {
+        let inverse = matches!(self.0.solver, Solver::Inverse(_));
+        self.0.intercept.unwrap_or(!inverse)
+    }
+
+    pub(crate) fn standardises(&self) -> bool {
+        self.0.standardise
+    }
+
+    pub(crate) fn links_directly(&self) -> bool {
+        self.0.direct_links
+    }
+
+    pub(crate) fn solver(&self) -> Solver {
+        self.0.solver
+    }
+
+    /// The settings.
+    #[must_use]
+    pub fn params(&self) -> &ElmParams<A> {
+        &self.0
+    }
+}
+
+/// A random layer and what it makes of the training inputs.
+pub(crate) struct Drawn<A: Scalar> {
+    pub(crate) scaler: Option<Scaler<A>>,
+    pub(crate) hidden: HiddenLayer<A>,
+    pub(crate) design: Array2<A>,
+}
