@@ -131,6 +131,21 @@ impl<A: Scalar> CheckedParams<A> {
         t: &T,
         keep: Keep,
     ) -> Result<Pruned<A>> {
+        self.fit_pruned_weighted(x, t, keep, None)
+    }
+
+    /// As [`fit_pruned`](Self::fit_pruned), with a weight for the squared residual of each row, which
+    /// decides what is useful as well.
+    ///
+    /// # Errors
+    /// Those of [`fit_pruned`](Self::fit_pruned) and [`LeastSquares::weights`].
+    pub fn fit_pruned_weighted<T: Targets<A>>(
+        &self,
+        x: &ArrayRef2<A>,
+        t: &T,
+        keep: Keep,
+        weights: Option<ArrayView1<'_, A>>,
+    ) -> Result<Pruned<A>> {
         let Solver::Ridge(ridge) = self.solver() else {
             return Err(Error::Conflict {
                 first: "a solver other than ridge",
@@ -145,7 +160,11 @@ impl<A: Scalar> CheckedParams<A> {
             design,
         } = self.draw(x.view(), t)?;
         let wide = (A::widen(design.view()), A::widen(t));
-        let problem = LeastSquares::of_views(wide.0.view(), wide.1.view())?;
+        let wide_weights = weights.map(A::widen);
+        let mut problem = LeastSquares::of_views(wide.0.view(), wide.1.view())?;
+        if let Some(weights) = &wide_weights {
+            problem = problem.weights(weights)?;
+        }
         let problem = problem.intercept(self.has_intercept());
         let (mut kept, path) = choose(&problem, hidden.neurons(), ridge, keep)?;
         kept.sort_unstable();
@@ -156,7 +175,9 @@ impl<A: Scalar> CheckedParams<A> {
             .chain(hidden.neurons()..design.ncols())
             .collect();
         let design = design.select(Axis(1), &columns);
-        let solution = self.solver().solve(&self.problem(&design, t, None)?)?;
+        let solution = self
+            .solver()
+            .solve(&self.problem(&design, t, weights.as_ref())?)?;
         Ok(Pruned {
             model: Elm::assemble(
                 scaler,
@@ -426,12 +447,14 @@ fn leave_one_out_scores(
     } = prepared;
     let Triangular { r, qtb, .. } = root.triangle(order)?;
     let upper = inverse(r.view())?;
-    let constant = constant_share(frame);
+    let constants = constant_shares(frame);
     let mut squares: Array2<f64> = Array2::zeros((order.len() + 1 - first, targets.ncols()));
     let blocks = hidden.axis_chunks_iter(Axis(0), BLOCK);
-    for (hidden, targets) in blocks.zip(targets.axis_chunks_iter(Axis(0), BLOCK)) {
+    let blocks = blocks.zip(targets.axis_chunks_iter(Axis(0), BLOCK));
+    for ((hidden, targets), constants) in blocks.zip(constants.chunks(BLOCK)) {
         let along = f64::product(hidden.select(Axis(1), order).view(), upper.view());
-        for (along, target) in along.rows().into_iter().zip(targets.rows()) {
+        let rows = along.rows().into_iter().zip(targets.rows());
+        for ((along, target), constant) in rows.zip(constants) {
             let mut residual = target.to_owned();
             let mut free = 1.0 - constant;
             for (used, (&q, weights)) in (1..).zip(along.iter().zip(qtb.rows())) {
@@ -456,10 +479,7 @@ fn leave_one_out_scores(
 }
 
 /// The leverage that an intercept gives each row.
-fn constant_share(frame: &Frame<f64>) -> f64 {
-    if frame.intercept {
-        frame.total_weight.recip()
-    } else {
-        0.0
-    }
+fn constant_shares(frame: &Frame<f64>) -> Vec<f64> {
+    let direction = frame.constant_direction();
+    direction.iter().map(|share| share * share).collect()
 }

@@ -4,7 +4,6 @@ mod few;
 mod lean;
 mod many;
 
-use elm::solve::{LeastSquares, Ridge, Solver};
 use elm::{Activation, Biases, Distribution, Elm, ElmParams, HiddenLayer, Neurons, Scaler};
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 
@@ -243,21 +242,6 @@ pub(crate) fn without_weights(scaler: &Scaler<f64>, hidden: HiddenLayer<f64>) ->
         beta,
         Array1::zeros(1),
     )?)
-}
-
-/// Output weights and constants by this ridge.
-fn solve(
-    h: &Array2<f64>,
-    t: &Array2<f64>,
-    weights: Option<&Array1<f64>>,
-    ridge: Ridge,
-) -> Result<(Array2<f64>, Array1<f64>)> {
-    let mut problem = LeastSquares::new(h, t)?.intercept(true);
-    if let Some(weights) = weights {
-        problem = problem.weights(weights)?;
-    }
-    let solution = Solver::from(ridge).solve(&problem)?;
-    Ok((solution.beta, solution.intercept))
 }
 
 /// What is known of measurements whatever is fitted to them.

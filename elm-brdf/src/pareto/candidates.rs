@@ -19,7 +19,7 @@ pub struct Candidate {
 }
 
 /// Sizes of networks.
-const NEURONS: [usize; 6] = [16, 24, 32, 40, 64, 128];
+const NEURONS: [usize; 8] = [16, 24, 32, 40, 48, 64, 80, 128];
 
 /// Networks by size, function, and pruned or not; the paper's; the tuned one; and every reference.
 #[must_use]

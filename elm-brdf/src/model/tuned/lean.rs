@@ -2,14 +2,14 @@
 
 use elm::prune::Keep;
 use elm::solve::Ridge;
-use elm::{Activation, Biases, Distribution, Elm, ElmParams, Scaler};
+use elm::{Activation, Biases, Distribution, ElmParams, Scaler};
 use ndarray::{Array2, ArrayView2, Axis};
 use rand::SeedableRng;
 use rand::seq::index;
 use rand_chacha::ChaCha8Rng;
 
 use super::many::{RIDGE, row_weights};
-use super::{Blank, provenance, solve, without_weights};
+use super::{Blank, provenance, without_weights};
 use crate::brdf::{Brdf, Fit, check};
 use crate::error::Result;
 use crate::features::Features;
@@ -33,7 +33,8 @@ use crate::model::{BrdfModel, Layer};
 ///
 /// The target is the log. The scales of weights and biases are those, of six pairs, whose network
 /// has the least error on rows that it was not fitted to, of 1500 to fit and 1500 to judge at most;
-/// then the output weights are fitted to all rows, by a ridge whose strength leave-one-out chooses
+/// of many rows the scale of each input is then moved as long as that lowers this error. At last the
+/// output weights are fitted to all rows, by a ridge whose strength leave-one-out chooses
 /// where there are few ([`Tuned::MANY`](super::Tuned::MANY)).
 ///
 /// ```
@@ -71,6 +72,8 @@ const MOST_DRAWN: usize = 256;
 /// Scales of weights, and deviations of biases.
 const SCALES: [f64; 3] = [0.5, 1.0, 2.0];
 const BIASES: [f64; 2] = [0.9, 1.8];
+/// An input's scale is moved by these factors in turn.
+const STEPS: [f64; 3] = [2.0, 1.414, 1.2];
 
 impl Lean {
     /// So many neurons, and the defaults.
@@ -123,25 +126,43 @@ impl Lean {
             x: x.select(Axis(0), judged),
             values: values.select(Axis(0), judged),
         };
-        let mut best: Option<(f64, Blank, Metrics)> = None;
+        let mut best: Option<Found> = None;
         for (scale, bias) in SCALES.into_iter().flat_map(|s| BIASES.map(|b| (s, b))) {
-            let (blank, held_out) = search.try_scales(scale, bias, &judge)?;
-            let error = self.metric.of(&held_out);
-            if best.as_ref().is_none_or(|(least, ..)| error < *least) {
-                best = Some((error, blank, held_out));
+            let found = search.try_scales(vec![scale; x.ncols()], bias, &judge)?;
+            if best.as_ref().is_none_or(|best| found.error < best.error) {
+                best = Some(found);
             }
         }
-        let Some((_, blank, held_out)) = best else {
+        let steps = if pairs.len() > super::Tuned::MANY {
+            &STEPS[..]
+        } else {
+            &[]
+        };
+        for step in steps {
+            for (input, factor) in (0..x.ncols()).flat_map(|i| [(i, *step), (i, 1.0 / step)]) {
+                let Some(so_far) = &mut best else { break };
+                let mut scales = so_far.scales.clone();
+                scales[input] *= factor;
+                let found = search.try_scales(scales, so_far.bias, &judge)?;
+                if found.error < so_far.error {
+                    *so_far = found;
+                }
+            }
+        }
+        let Some(Found {
+            blank, held_out, ..
+        }) = best
+        else {
             return Err(elm::Error::NoConvergence {
                 what: "the search for a network",
             }
             .into());
         };
-        let h = blank.matrix(&x)?;
         let weights = row_weights(self.metric, pairs, values, &link);
-        let (beta, intercept) = solve(&h, &targets, weights.as_ref(), ridge(pairs.len()))?;
+        let weights = weights.as_ref().map(|weights| weights.view());
         let hidden = blank.network.hidden().clone();
-        let network = Elm::from_parts(Some(scaler.clone()), hidden, beta, intercept)?;
+        let params = blank.draw.params.clone().solver(search.ridge).check()?;
+        let network = params.fit_layer(Some(scaler.clone()), hidden, &x, &targets, weights)?;
         let mut about = provenance(self.seed, self.metric, pairs, values);
         about.held_out = Some(held_out);
         let layer = Layer::Drawn(vec![blank.draw]);
@@ -169,6 +190,15 @@ fn select(pairs: &[Pair], rows: &[usize]) -> Vec<Pair> {
     rows.iter().map(|&row| pairs[row]).collect()
 }
 
+/// Scales, and what a network with them is worth.
+struct Found {
+    scales: Vec<f64>,
+    bias: f64,
+    blank: Blank,
+    held_out: Metrics,
+    error: f64,
+}
+
 struct Search<'a> {
     lean: &'a Lean,
     scaler: &'a Scaler<f64>,
@@ -186,7 +216,7 @@ struct Judge {
 }
 
 impl Search<'_> {
-    fn try_scales(&self, scale: f64, bias: f64, judge: &Judge) -> Result<(Blank, Metrics)> {
+    fn try_scales(&self, scales: Vec<f64>, bias: f64, judge: &Judge) -> Result<Found> {
         let neurons = self.lean.neurons;
         let drawn = if self.lean.pruned {
             neurons.max((DRAWN * neurons).min(MOST_DRAWN.max(neurons + neurons / 2)))
@@ -196,13 +226,15 @@ impl Search<'_> {
         let params = ElmParams::new(drawn)
             .activation(self.lean.activation.clone())
             .distribution(Distribution::Normal)
-            .scale(scale)
+            .input_scales(scales.clone())
             .biases(Biases::Scaled(bias))
-            .solver(self.ridge)
             .seed(self.lean.seed);
-        let mut blank = Blank::new(params.clone(), 0, self.scaler)?;
+        let mut blank = Blank::new(params.clone(), scales.len(), self.scaler)?;
+        let params = params.solver(self.ridge).check()?;
+        let weights = self.weights.as_ref().map(|weights| weights.view());
         if drawn > neurons {
-            let pruned = params.fit_pruned(&self.x, &self.targets, Keep::Neurons(neurons))?;
+            let keep = Keep::Neurons(neurons);
+            let pruned = params.fit_pruned_weighted(&self.x, &self.targets, keep, weights)?;
             let mut kept = vec![false; drawn];
             for &number in &pruned.kept {
                 kept[number] = true;
@@ -211,12 +243,21 @@ impl Search<'_> {
             let hidden = blank.network.hidden().subset(&pruned.kept)?;
             blank.network = without_weights(self.scaler, hidden)?;
         }
-        let h = blank.matrix(&self.x)?;
-        let (beta, constant) = solve(&h, &self.targets, self.weights.as_ref(), self.ridge)?;
-        let predicted = self
-            .link
-            .to_values(blank.matrix(&judge.x)?.dot(&beta) + &constant)?;
+        let network = params.fit_layer(
+            Some(self.scaler.clone()),
+            blank.network.hidden().clone(),
+            &self.x,
+            &self.targets,
+            weights,
+        )?;
+        let predicted = self.link.to_values(network.predict(&judge.x)?)?;
         let held_out = Metrics::of(&judge.pairs, predicted.view(), judge.values.view())?;
-        Ok((blank, held_out))
+        Ok(Found {
+            scales,
+            bias,
+            blank,
+            error: self.lean.metric.of(&held_out),
+            held_out,
+        })
     }
 }

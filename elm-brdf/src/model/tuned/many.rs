@@ -61,10 +61,14 @@ pub(super) fn fit(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) ->
     let params = tuned.waves(count, &setting.scales);
     let mut blank = Blank::new(params.clone(), x.ncols(), &scaler)?;
     let params = params.solver(Ridge::relative(RIDGE));
-    let pruned = params.fit_pruned(
+    let weights = row_weights(tuned.metric, pairs, values, &link);
+    let few_weights = weights.as_ref().map(|weights| weights.select(Axis(0), few));
+    let params = params.check()?;
+    let pruned = params.fit_pruned_weighted(
         &x.select(Axis(0), few),
         &targets.select(Axis(0), few),
         Keep::Neurons(neurons),
+        few_weights.as_ref().map(|weights| weights.view()),
     )?;
     let mut kept = vec![false; count];
     for &number in &pruned.kept {
@@ -74,9 +78,7 @@ pub(super) fn fit(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) ->
     let hidden = blank.network.hidden().subset(&pruned.kept)?;
     let weights = row_weights(tuned.metric, pairs, values, &link);
     let weights = weights.as_ref().map(|weights| weights.view());
-    let network = params
-        .check()?
-        .fit_layer(Some(scaler), hidden, &x, &targets, weights)?;
+    let network = params.fit_layer(Some(scaler), hidden, &x, &targets, weights)?;
     let mut about = provenance(tuned.seed, tuned.metric, pairs, values);
     about.held_out = Some(setting.held_out);
     let layer = Layer::Drawn(vec![blank.draw]);
