@@ -260,7 +260,7 @@ fn damaged_and_lying_files_are_refused() {
     lie("\"sum-difference\"", "\"no such inputs\"");
     // More neurons than there are weights, and more than memory holds.
     lie("\"count\": 40", "\"count\": 41");
-    lie("\"count\": 14", "\"count\": 18446744073709551615");
+    lie("\"count\": 40", "\"count\": 18446744073709551615");
     lie("\"offset\": ", "\"offset\": -");
     lie("elm-brdf model", "elm model");
 }
