@@ -84,7 +84,8 @@ pub(crate) struct RowSource<'a, A: Scalar> {
 /// Bytes in a tile: it stays in the second-level or third-level cache between being written and
 /// being multiplied, and has enough rows that adding its product to the sums costs little.
 const TILE_BYTES: usize = 1 << 21;
-/// Places that the rows for a first guess at the means come from.
+/// Rows for a first guess at the means, and the places that they come from.
+const SAMPLE: usize = 256;
 const RUNS: usize = 64;
 
 impl<A: Scalar> RowSource<'_, A> {
@@ -186,10 +187,10 @@ impl<A: Scalar> Moments<A> {
         let mut tile = vec![A::zero(); tile_rows * width];
         let mut shift = vec![A::zero(); neurons + outputs];
         let mut sums = Array2::zeros((width, width).f());
-        if source.intercept {
+        if source.intercept && rows > tile_rows {
             // Of rows from everywhere, as the first may be unlike the rest.
-            let mut roots = Vec::with_capacity(tile_rows);
-            for run in spread_runs(rows, tile_rows) {
+            let mut roots = Vec::with_capacity(SAMPLE);
+            for run in spread_runs(rows, SAMPLE.min(tile_rows)) {
                 let to = &mut tile[roots.len() * width..][..run.len() * width];
                 source.write(run.clone(), &frame, &shift, to)?;
                 roots.extend(frame.root_weights.slice(s![run]));
@@ -200,6 +201,16 @@ impl<A: Scalar> Moments<A> {
             let range = first..rows.min(first + tile_rows);
             let tile = &mut tile[..range.len() * width];
             source.write(range, &frame, &shift, tile)?;
+            if source.intercept && rows <= tile_rows {
+                // All rows are here: made once, shifted now.
+                let roots = &frame.root_weights;
+                shift = centre_of(tile, width, &roots.to_vec());
+                for (row, &root) in tile.chunks_exact_mut(width).zip(roots) {
+                    for (value, &shift) in row.iter_mut().zip(&shift) {
+                        *value -= shift * root;
+                    }
+                }
+            }
             if let Ok(tile) = ArrayView2::from_shape((tile.len() / width, width), tile) {
                 A::add_gram(tile, &mut sums);
             }
@@ -333,17 +344,19 @@ fn centre_of<A: Scalar>(tile: &[A], width: usize, roots: &[A]) -> Vec<A> {
         return sums;
     };
     let mut total = first_root * first_root;
+    let first: Vec<A> = first.iter().map(|&value| value / first_root).collect();
     for (row, &root) in rows {
         let weight = root * root;
         total += weight;
-        for ((sum, &value), &first) in sums.iter_mut().zip(row).zip(first) {
-            *sum += weight * (value / root - first / first_root);
+        let columns = sums.iter_mut().zip(row).zip(&first);
+        if root == A::one() {
+            columns.for_each(|((sum, &value), &first)| *sum += value - first);
+        } else {
+            columns.for_each(|((sum, &value), &first)| *sum += weight * (value / root - first));
         }
     }
-    sums.iter()
-        .zip(first)
-        .map(|(&sum, &first)| first / first_root + sum / total)
-        .collect()
+    let value = |(&sum, &first): (&A, &A)| first + sum / total;
+    sums.iter().zip(&first).map(value).collect()
 }
 
 #[cfg(test)]
