@@ -446,3 +446,15 @@ fn single_precision_has_the_same_answers_at_the_ends_of_its_range() {
         }
     }
 }
+
+#[test]
+fn a_student_t_distribution_needs_a_degree_of_freedom() {
+    let params = ElmParams::<f64>::new(3).distribution(elm::Distribution::StudentT(0));
+    assert!(matches!(
+        params.check(),
+        Err(Error::Parameter {
+            name: "degrees of freedom",
+            ..
+        })
+    ));
+}

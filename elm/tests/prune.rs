@@ -4,9 +4,9 @@
 
 use elm::prune::{Keep, Pruned};
 use elm::solve::{Inverse, PseudoInverse, Ridge};
-use elm::{Activation, Biases, Elm, ElmParams, Error, Neurons, metrics};
+use elm::{Activation, Biases, Elm, ElmParams, Error, Neurons, Scaler, metrics};
 use elm_datasets::toy::{self, Toy};
-use ndarray::{Array1, Array2, Axis, array};
+use ndarray::{Array1, Array2, Axis, array, s};
 
 /// Smooth, of four inputs.
 fn smooth(rows: usize, seed: u64) -> (Array2<f64>, Array1<f64>) {
@@ -257,5 +257,49 @@ fn what_cannot_be_pruned_is_named() {
         by(params(30, 1).solver(PseudoInverse::default())),
     ] {
         assert!(matches!(error, Error::Conflict { .. }), "{error}");
+    }
+}
+
+#[test]
+fn rows_without_weight_have_no_say_in_what_is_kept() {
+    let (x, t) = smooth(300, 5);
+    let checked = params(60, 5).solver(Ridge::relative(1e-8)).check().unwrap();
+    // Every third row is wrong, and does not count.
+    let wrong = |row: usize| row % 3 == 0;
+    let spoilt = Array1::from_shape_fn(300, |row| if wrong(row) { 1e3 } else { t[row] });
+    let weights = Array1::from_shape_fn(300, |row| if wrong(row) { 0.0 } else { 2.0 });
+    let kept = |t: &Array1<f64>, weights: &Array1<f64>| {
+        let keep = Keep::Neurons(20);
+        let pruned = checked.fit_pruned_weighted(&x, t, keep, Some(weights.view()));
+        pruned.unwrap()
+    };
+    let (clean, weighted) = (kept(&t, &weights), kept(&spoilt, &weights));
+    assert_eq!(clean.kept, weighted.kept);
+    assert_ne!(kept(&spoilt, &Array1::ones(300)).kept, weighted.kept);
+    let difference = clean.model.predict(&x).unwrap() - weighted.model.predict(&x).unwrap();
+    assert!(difference.iter().all(|d| d.abs() < 1e-9));
+}
+
+#[test]
+fn a_layer_that_is_there_already_is_fitted_as_when_it_was_drawn() {
+    let (x, t) = smooth(200, 7);
+    for solver in [Ridge::relative(1e-6), Ridge::leave_one_out()] {
+        let checked = ElmParams::new(30).seed(7).solver(solver).check().unwrap();
+        let drawn = checked.fit(&x, &t).unwrap();
+        let layer = checked.hidden_layer(4).unwrap();
+        let scaler = drawn.scaler().cloned();
+        let given = checked.fit_layer(scaler.clone(), layer.clone(), &x, &t, None);
+        let difference = given.unwrap().predict(&x).unwrap() - drawn.predict(&x).unwrap();
+        assert!(difference.iter().all(|d| d.abs() < 1e-9));
+
+        let narrow = Scaler::measured(&x.slice(s![.., ..2])).unwrap();
+        for (scaler, layer, t) in [
+            (scaler.clone(), checked.hidden_layer(3).unwrap(), &t),
+            (scaler, layer.clone(), &t.slice(s![..9]).to_owned()),
+            (Some(narrow), layer, &t),
+        ] {
+            let refused = checked.fit_layer(scaler, layer, &x, t, None);
+            assert!(matches!(refused, Err(Error::Shape { .. })), "{refused:?}");
+        }
     }
 }

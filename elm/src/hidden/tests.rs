@@ -217,3 +217,29 @@ fn a_distance_keeps_its_digits_far_from_the_origin() {
         approx::assert_abs_diff_eq!(*z, expected, epsilon = 3.5 * f64::EPSILON * expected);
     }
 }
+
+#[test]
+fn student_t_weights_have_their_variance_and_a_root_in_common() {
+    let x = Array2::<f64>::zeros((1, 2));
+    let draw = |count| {
+        let mut plan = plan::<f64>(count, 4);
+        plan.distribution = Distribution::StudentT(5);
+        plan.groups[0].biases = Biases::Scaled(1.0);
+        plan.draw(x.view())
+    };
+    let layer = draw(40_000);
+    let squares = layer.weights.mapv(|w| w * w);
+    // Of t with 5 degrees of freedom 5 / 3; of fourth moment 25, so that the mean of 80,000
+    // squares has a deviation of 0.02. Biases are normal.
+    let variance = squares.mean().unwrap();
+    assert!((variance - 5.0 / 3.0).abs() < 0.1, "{variance}");
+    let biases = layer.biases.mapv(|b| b * b).mean().unwrap();
+    assert!((biases - 1.0).abs() < 0.05, "{biases}");
+    // Weights of one neuron are large together: E[w1^2 w2^2] = 25 / 3, not 25 / 9.
+    let together = (&squares.row(0) * &squares.row(1)).mean().unwrap();
+    assert!(together > 4.0, "{together}");
+    // Fewer neurons are the beginning of more.
+    let few = draw(10);
+    assert_eq!(few.weights, layer.weights.slice(s![.., ..10]));
+    assert_eq!(few.biases, layer.biases.slice(s![..10]));
+}
