@@ -265,7 +265,7 @@ fn rows_without_weight_have_no_say_in_what_is_kept() {
     let (x, t) = smooth(300, 5);
     let checked = params(60, 5).solver(Ridge::relative(1e-8)).check().unwrap();
     // Every third row is wrong, and does not count.
-    let wrong = |row: usize| row % 3 == 0;
+    let wrong = |row: usize| row.is_multiple_of(3);
     let spoilt = Array1::from_shape_fn(300, |row| if wrong(row) { 1e3 } else { t[row] });
     let weights = Array1::from_shape_fn(300, |row| if wrong(row) { 0.0 } else { 2.0 });
     let kept = |t: &Array1<f64>, weights: &Array1<f64>| {
