@@ -26,8 +26,9 @@
 //!
 //! # How
 //! Backward elimination under ridge of one strength $\lambda$: the solver's, or where that chooses
-//! its own the one that generalised cross-validation chooses for all candidates. With $A = (\tilde H^T \tilde H + \lambda)^{-1}$
-//! striking out neuron $k$ and fitting the others again costs
+//! its own the one that generalised cross-validation chooses for all candidates. With
+//! $A = (\tilde H^T \tilde H + \lambda)^{-1}$ striking out neuron $k$ and fitting the others again
+//! costs
 //! $$\frac{\beta_k^2}{A_{kk}}$$
 //! of the penalised sum of squares (of several outputs, the sum of these relative to the outputs'
 //! variances), exactly; the neuron that costs least goes, $A$ and $\beta$ are brought down by one

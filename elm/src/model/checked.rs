@@ -98,15 +98,11 @@ impl<A: Scalar> CheckedParams<A> {
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<Elm<A>> {
         let t = t.as_matrix();
-        check_matrix("inputs", x.view())?;
-        check_matrix("targets", t)?;
-        check_length("rows of targets", t.nrows(), x.nrows())?;
+        check_data(x.view(), t, hidden.neurons())?;
         check_length("inputs of the layer", hidden.inputs(), x.ncols())?;
         if let Some(scaler) = &scaler {
             check_length("inputs of the scaler", scaler.mean().len(), x.ncols())?;
         }
-        let neurons = hidden.neurons();
-        check_room("the hidden-layer matrix", x.nrows().min(neurons), neurons)?;
         self.output_weights(scaler, hidden, x.view(), t, weights)
     }
 
@@ -252,14 +248,7 @@ impl<A: Scalar> CheckedParams<A> {
         x: ArrayView2<'_, A>,
         t: ArrayView2<'_, A>,
     ) -> Result<(Option<Scaler<A>>, HiddenLayer<A>)> {
-        check_matrix("inputs", x)?;
-        check_matrix("targets", t)?;
-        check_length("rows of targets", t.nrows(), x.nrows())?;
-
-        // Asked before anything is drawn, as a failed allocation would abort the program. Where rows
-        // outnumber neurons the matrix itself may not be needed.
-        let neurons = self.0.neurons();
-        check_room("the hidden-layer matrix", x.nrows().min(neurons), neurons)?;
+        check_data(x, t, self.0.neurons())?;
         let scaler = self.0.standardise.then(|| Scaler::measure(x));
         let hidden = match &scaler {
             Some(scaler) if self.needs_rows() => self.layer(scaler.transform(x).view())?,
@@ -334,6 +323,16 @@ impl<A: Scalar> CheckedParams<A> {
     pub fn params(&self) -> &ElmParams<A> {
         &self.0
     }
+}
+
+/// Whether data can be fitted by so many neurons.
+fn check_data<A: Scalar>(x: ArrayView2<'_, A>, t: ArrayView2<'_, A>, neurons: usize) -> Result<()> {
+    check_matrix("inputs", x)?;
+    check_matrix("targets", t)?;
+    check_length("rows of targets", t.nrows(), x.nrows())?;
+    // Asked before anything is drawn, as a failed allocation would abort the program. Where rows
+    // outnumber neurons the matrix itself may not be needed.
+    check_room("the hidden-layer matrix", x.nrows().min(neurons), neurons)
 }
 
 /// A random layer and what it makes of the training inputs.

@@ -15,9 +15,10 @@ impl<A: Scalar> Validator<A> {
     /// takes them to be), with the $\sigma$ that makes it largest, an intercept integrated out:
     /// $$-\frac12 \left[ m \ln \frac{2 \pi q}{m} + m + \sum_j \ln \frac{s_j^2 + \lambda}{\lambda} -
     /// \sum_i \ln w_i \right], \qquad q = \sum_j \frac{\lambda c_j^2}{s_j^2 + \lambda} + \sum_i r_i^2,$$
-    /// with $m$ rows that count, one fewer with an intercept. It weighs fit against complexity, and may
-    /// be compared between hidden layers of any size for the same rows and weights: with few rows it
-    /// chooses among layers more surely than held-out errors, which a few rows decide.
+    /// with $m$ rows that count, one fewer with an intercept, and weights relative to the largest. It
+    /// weighs fit against complexity, and may be compared between hidden layers of any size for the
+    /// same rows and weights: with few rows it chooses among layers more surely than held-out errors,
+    /// which a few rows decide.
     ///
     /// D. MacKay, *Bayesian Interpolation*, Neural Computation 4(3), 1992; the restricted likelihood:
     /// H. Patterson, R. Thompson, Biometrika 58(3), 1971.

@@ -33,9 +33,9 @@ use crate::model::{BrdfModel, Layer};
 ///
 /// The target is the log. The scales of weights and biases are those, of six pairs, whose network
 /// has the least error on rows that it was not fitted to, of 1500 to fit and 1500 to judge at most;
-/// of many rows the scale of each input is then moved as long as that lowers this error. At last the
-/// output weights are fitted to all rows, by a ridge whose strength leave-one-out chooses
-/// where there are few ([`Tuned::MANY`](super::Tuned::MANY)).
+/// of many rows the scale of each input is then moved where that lowers this error. At last the output
+/// weights are fitted to all rows, by a ridge whose strength leave-one-out chooses where there are
+/// few ([`Tuned::MANY`](super::Tuned::MANY)).
 ///
 /// ```
 /// use elm_brdf::{batch::Packed, geometry::pairs, model::Lean};
@@ -133,31 +133,30 @@ impl Lean {
                 best = Some(found);
             }
         }
-        let steps = if pairs.len() > super::Tuned::MANY {
-            &STEPS[..]
-        } else {
-            &[]
-        };
-        for step in steps {
-            for (input, factor) in (0..x.ncols()).flat_map(|i| [(i, *step), (i, 1.0 / step)]) {
-                let Some(so_far) = &mut best else { break };
-                let mut scales = so_far.scales.clone();
-                scales[input] *= factor;
-                let found = search.try_scales(scales, so_far.bias, &judge)?;
-                if found.error < so_far.error {
-                    *so_far = found;
-                }
-            }
-        }
-        let Some(Found {
-            blank, held_out, ..
-        }) = best
-        else {
+        let Some(mut best) = best else {
             return Err(elm::Error::NoConvergence {
                 what: "the search for a network",
             }
             .into());
         };
+        if pairs.len() > super::Tuned::MANY {
+            for (step, input) in STEPS
+                .into_iter()
+                .flat_map(|s| (0..x.ncols()).map(move |i| (s, i)))
+            {
+                for factor in [step, 1.0 / step] {
+                    let mut scales = best.scales.clone();
+                    scales[input] *= factor;
+                    let found = search.try_scales(scales, best.bias, &judge)?;
+                    if found.error < best.error {
+                        best = found;
+                    }
+                }
+            }
+        }
+        let Found {
+            blank, held_out, ..
+        } = best;
         let weights = row_weights(self.metric, pairs, values, &link);
         let weights = weights.as_ref().map(|weights| weights.view());
         let hidden = blank.network.hidden().clone();

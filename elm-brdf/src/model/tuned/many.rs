@@ -60,10 +60,9 @@ pub(super) fn fit(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) ->
     let few = &rows[..rows.len().min(PRUNE_ROWS.max(count))];
     let params = tuned.waves(count, &setting.scales);
     let mut blank = Blank::new(params.clone(), x.ncols(), &scaler)?;
-    let params = params.solver(Ridge::relative(RIDGE));
+    let params = params.solver(Ridge::relative(RIDGE)).check()?;
     let weights = row_weights(tuned.metric, pairs, values, &link);
     let few_weights = weights.as_ref().map(|weights| weights.select(Axis(0), few));
-    let params = params.check()?;
     let pruned = params.fit_pruned_weighted(
         &x.select(Axis(0), few),
         &targets.select(Axis(0), few),
@@ -76,7 +75,6 @@ pub(super) fn fit(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) ->
     }
     blank.draw.kept = Some(kept);
     let hidden = blank.network.hidden().subset(&pruned.kept)?;
-    let weights = row_weights(tuned.metric, pairs, values, &link);
     let weights = weights.as_ref().map(|weights| weights.view());
     let network = params.fit_layer(Some(scaler), hidden, &x, &targets, weights)?;
     let mut about = provenance(tuned.seed, tuned.metric, pairs, values);
