@@ -1,11 +1,13 @@
 //! Fitted reflectance models: sane everywhere, and the same after a file.
 
-#![allow(clippy::unwrap_used)]
+// What was skipped is for whoever runs the tests by hand.
+#![allow(clippy::print_stdout, clippy::unwrap_used)]
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::path::{Path, PathBuf};
 
 use elm::{Activation, ElmParams, persist};
-use elm_datasets::{Invalid, MaterialId, paint, synthetic};
+use elm_datasets::{Invalid, MaterialId, OpenOptions, paint, synthetic};
 use ndarray::{Array2, s};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -67,6 +69,37 @@ fn values_are_finite_and_not_negative_for_every_pair_of_directions() {
     for model in [few, many] {
         let values = model.eval(&directions(20_000, 3)).unwrap();
         assert!(values.iter().all(|&v| v.is_finite() && v >= 0.0));
+    }
+}
+
+/// The models of `docs/accuracy.md`, at a million pairs each.
+#[test]
+fn a_million_values_of_each_rgl_material_are_finite_and_not_negative() {
+    let shared = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared");
+    let root = std::env::var_os("ELM_BRDF_DATA").map_or_else(shared, PathBuf::from);
+    let everywhere = directions(1_000_000, 4);
+    for material in ["cc_iris_purple_gem", "paper_white", "vch_golden_yellow"] {
+        let file = root.join(format!("rgl/{material}_rgb_train.csv"));
+        if !file.is_file() {
+            println!("skipped: no {}", file.display());
+            continue;
+        }
+        let samples = elm_datasets::open(&file, &OpenOptions::default())
+            .unwrap()
+            .samples;
+        let tuned = Tuned {
+            metric: Metric::LogCosine,
+            max_floats: Some(675),
+            ..Tuned::default()
+        };
+        let pairs = geometry::pairs(&samples.directions);
+        let model = tuned.fit_model(&pairs, samples.values.view()).unwrap();
+        assert!(model.stored_floats() <= 675);
+        let values = model.eval(&everywhere).unwrap();
+        assert!(
+            values.iter().all(|&v| v.is_finite() && v >= 0.0),
+            "{material}"
+        );
     }
 }
 
