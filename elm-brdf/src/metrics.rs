@@ -1,11 +1,11 @@
 //! Measures of error of a reflectance model's predictions; every table and file takes them from
 //! here.
 
-use std::fmt;
 use std::str::FromStr;
+use std::{fmt, iter};
 
 use elm::metrics;
-use ndarray::{Array1, ArrayView2, Zip};
+use ndarray::{Array1, ArrayView2, aview1};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
@@ -146,25 +146,12 @@ impl Metrics {
         if pairs.len() != truth.nrows() {
             return Err(shape("directions", truth.nrows(), pairs.len()));
         }
-        let flat = |values: ArrayView2<'_, f64>| values.iter().copied().collect::<Array1<f64>>();
-        let (p, t) = (flat(predicted), flat(truth));
-        let rmse = metrics::rmse(&p, &t)?;
-        let scale = metrics::rmse(&Array1::zeros(t.len()), &t)?;
-        let mut log_cosine = 0.0;
-        for ((pair, predicted), truth) in pairs.iter().zip(predicted.rows()).zip(truth.rows()) {
-            let cos = pair.outgoing[2].max(0.0);
-            Zip::from(predicted).and(truth).for_each(|&f, &g| {
-                log_cosine += (log_one_plus(f * cos) - log_one_plus(g * cos)).abs();
-            });
-        }
-        Ok(Self {
-            rmse,
-            mae: metrics::mae(&p, &t)?,
-            correlation: metrics::correlation(&p, &t)?,
-            relative_rmse: (scale > 0.0).then(|| rmse / scale),
-            log_cosine_mae: log_cosine / t.len() as f64,
-            cube_root_rmse: metrics::rmse(&p.mapv(f64::cbrt), &t.mapv(f64::cbrt))?,
-        })
+        let cosines = pairs.iter().map(|pair| pair.outgoing[2].max(0.0));
+        let cosines: Vec<f64> = cosines
+            .flat_map(|cosine| iter::repeat_n(cosine, truth.ncols()))
+            .collect();
+        let truth = Truth::new(cosines, truth.iter().copied().collect());
+        truth.compare(predicted.iter().copied()).metrics()
     }
 
     /// The mean of each measure over those that have it; `None` of none.
@@ -203,13 +190,103 @@ impl Metrics {
     }
 }
 
-fn log_one_plus(x: f64) -> f64 {
-    // `max` would turn a NaN into a number.
-    if x < f64::EPSILON - 1.0 {
-        f64::EPSILON.ln()
-    } else {
-        x.ln_1p()
+/// The truth, with what every comparison needs of it.
+#[derive(Debug, Clone)]
+pub(crate) struct Truth {
+    cosines: Vec<f64>,
+    values: Vec<f64>,
+    cube_roots: Vec<f64>,
+}
+
+impl Truth {
+    /// Of as many cosines of the viewing angle as values.
+    pub(crate) fn new(cosines: Vec<f64>, values: Vec<f64>) -> Self {
+        Self {
+            cube_roots: values.iter().map(|value| value.cbrt()).collect(),
+            cosines,
+            values,
+        }
     }
+
+    /// With as many predictions, in the same order.
+    pub(crate) fn compare(&self, predicted: impl IntoIterator<Item = f64>) -> Comparison {
+        let predicted: Vec<f64> = predicted.into_iter().collect();
+        let lit = self.values.iter().zip(&self.cosines);
+        Comparison {
+            log_cosine: predicted
+                .iter()
+                .zip(lit)
+                .map(|(&f, (&g, &cosine))| log_distance(f * cosine, g * cosine))
+                .collect(),
+            truth: self.values.clone(),
+            predicted_roots: predicted.iter().map(|value| value.cbrt()).collect(),
+            truth_roots: self.cube_roots.clone(),
+            predicted,
+        }
+    }
+}
+
+/// Predictions beside the truth, in the forms that the measures take.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Comparison {
+    predicted: Vec<f64>,
+    truth: Vec<f64>,
+    /// $|\ln(1 + f \cos\theta_o) - \ln(1 + g \cos\theta_o)|$.
+    log_cosine: Vec<f64>,
+    predicted_roots: Vec<f64>,
+    truth_roots: Vec<f64>,
+}
+
+impl Comparison {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.truth.is_empty()
+    }
+
+    /// Adds what another says of these of its places.
+    pub(crate) fn extend(&mut self, other: &Self, places: impl Iterator<Item = usize> + Clone) {
+        let add = |own: &mut Vec<f64>, other: &[f64]| {
+            own.extend(places.clone().map(|place| other[place]));
+        };
+        add(&mut self.predicted, &other.predicted);
+        add(&mut self.truth, &other.truth);
+        add(&mut self.log_cosine, &other.log_cosine);
+        add(&mut self.predicted_roots, &other.predicted_roots);
+        add(&mut self.truth_roots, &other.truth_roots);
+    }
+
+    /// # Errors
+    /// [`elm::Error`] where there is nothing to compare, or a number is not finite.
+    pub(crate) fn metrics(&self) -> Result<Metrics> {
+        let (p, t) = (aview1(&self.predicted), aview1(&self.truth));
+        let rmse = metrics::rmse(&p, &t)?;
+        let black = Array1::zeros(t.len());
+        let scale = metrics::rmse(&black, &t)?;
+        let roots = (aview1(&self.predicted_roots), aview1(&self.truth_roots));
+        Ok(Metrics {
+            rmse,
+            mae: metrics::mae(&p, &t)?,
+            correlation: metrics::correlation(&p, &t)?,
+            relative_rmse: (scale > 0.0).then(|| rmse / scale),
+            log_cosine_mae: self.log_cosine.iter().sum::<f64>() / t.len() as f64,
+            cube_root_rmse: metrics::rmse(&roots.0, &roots.1)?,
+        })
+    }
+}
+
+/// $|\ln(1 + f) - \ln(1 + g)|$ with what has no logarithm taken for the most negative number that
+/// has one, as one logarithm of $1 + |f - g| / (1 + \min(f, g))$.
+fn log_distance(f: f64, g: f64) -> f64 {
+    // `max` would turn a NaN into a number.
+    let bounded = |x: f64| {
+        let least = f64::EPSILON - 1.0;
+        if x < least { least } else { x }
+    };
+    let (f, g) = (bounded(f), bounded(g));
+    let growth = (f - g).abs() / (1.0 + f.min(g));
+    if growth == f64::INFINITY {
+        return (f.ln_1p() - g.ln_1p()).abs();
+    }
+    growth.ln_1p()
 }
 
 #[cfg(test)]
@@ -274,6 +351,17 @@ mod tests {
         assert!(of(-3.0).unwrap().log_cosine_mae.is_finite());
         let error = of(f64::NAN).unwrap_err().to_string();
         assert!(error.contains("not finite"), "{error}");
+    }
+
+    #[test]
+    fn one_logarithm_says_what_the_difference_of_two_does() {
+        let numbers = [-3.0, -1.0, -0.9, 0.0, 1e-300, 0.1, 0.3, 7.0, 1e12, f64::MAX];
+        let log = |x: f64| x.max(f64::EPSILON - 1.0).ln_1p();
+        for (f, g) in numbers.iter().flat_map(|&f| numbers.map(|g| (f, g))) {
+            let expected = (log(f) - log(g)).abs();
+            assert_abs_diff_eq!(log_distance(f, g), expected, epsilon = 1e-13);
+        }
+        assert!(log_distance(f64::NAN, 0.0).is_nan() && log_distance(0.0, f64::NAN).is_nan());
     }
 
     #[test]

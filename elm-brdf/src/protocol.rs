@@ -1,7 +1,9 @@
 //! k-fold cross-validation of anything that can be fitted to measurements.
 
+use std::iter;
+
 use elm_datasets::{Directions, Material, MaterialId, Measurements, Samples};
-use ndarray::{Array1, Array2, ArrayView2, Axis, Slice, concatenate};
+use ndarray::{Array2, ArrayView2, Axis, Slice, concatenate};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -9,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::brdf::{Brdf, Fit};
 use crate::error::{Error, Result};
 use crate::geometry::{self, Pair};
-use crate::metrics::Metrics;
+use crate::metrics::{Comparison, Metrics, Truth};
 use crate::model::SideBySide;
 use crate::prior::{Prior, PriorParams};
 use crate::quality::{self, NoiseFloor};
@@ -285,100 +287,56 @@ impl<'a> Group<'a> {
         folds: &Folds,
         mut done: impl FnMut(usize),
     ) -> Result<(Array2<f64>, Vec<Scores>)> {
-        let columns = self.values.ncols();
-        let mut train = Training::default();
-        let mut held_out = Array2::zeros(self.values.dim());
-        let mut fold_metrics: Vec<Vec<Metrics>> = vec![Vec::new(); columns];
+        let rows = self.rows.len();
         let labels: Vec<usize> = self.rows.iter().map(|&row| folds.of_row(row)).collect();
         let (pairs, values) = (&self.pairs, self.values.view());
         let fits = method.cross_fits(pairs, values, &labels, folds.count, &mut done)?;
-        for (fold, fitted) in fits.into_iter().enumerate() {
-            let (test_rows, train_rows): (Vec<usize>, Vec<usize>) =
-                (0..self.rows.len()).partition(|&row| labels[row] == fold);
-            let (train_pairs, train_values) = self.select(&train_rows);
-            train.push(
-                &train_pairs,
-                fitted.select(Axis(0), &train_rows),
-                train_values,
-            );
-            // Where invalid values are dropped a fold may hold none of a material's rows.
-            if !test_rows.is_empty() {
-                let (test_pairs, truth) = self.select(&test_rows);
-                let predicted = fitted.select(Axis(0), &test_rows);
-                for (column, metrics) in fold_metrics.iter_mut().enumerate() {
-                    let (predicted, truth) = (one(&predicted, column), one(&truth, column));
-                    metrics.push(Metrics::of(&test_pairs, predicted, truth)?);
-                }
-                for (predicted, &row) in predicted.rows().into_iter().zip(&test_rows) {
-                    held_out.row_mut(row).assign(&predicted);
-                }
-            }
-        }
-        let exchanged = quality::exchanged(&self.pairs);
-        let scores = (0..columns).map(|column| {
-            let values = self.values.column(column);
-            let saturated = quality::saturated(&self.pairs, values);
-            let all = Metrics::of(
-                &self.pairs,
-                one(&held_out, column),
-                one(&self.values, column),
-            )?;
-            Ok(Scores {
-                train: train.metrics(column)?,
-                held_out: all,
-                held_out_fold_mean: Metrics::mean(&fold_metrics[column]).unwrap_or(all),
-                held_out_unsaturated: self.without(&saturated, &held_out, column)?,
-                noise_floor: NoiseFloor::of(&exchanged, values),
-                saturated,
-            })
+        let held_out = Array2::from_shape_fn(values.dim(), |(row, column)| {
+            fits[labels[row]][[row, column]]
         });
+        let cosines: Vec<f64> = pairs.iter().map(|p| p.outgoing[2].max(0.0)).collect();
+        let exchanged = quality::exchanged(pairs);
+        let scores = values
+            .columns()
+            .into_iter()
+            .enumerate()
+            .map(|(column, values)| {
+                let truth = Truth::new(cosines.clone(), values.to_vec());
+                let fits: Vec<Comparison> = fits
+                    .iter()
+                    .map(|fit| truth.compare(fit.column(column).iter().copied()))
+                    .collect();
+                let mut train = Comparison::default();
+                let mut each_fold = Vec::with_capacity(fits.len());
+                for (fold, fit) in fits.iter().enumerate() {
+                    let trained = (0..rows).filter(|&row| labels[row] != fold);
+                    train.extend(fit, trained);
+                    let mut test = Comparison::default();
+                    test.extend(fit, (0..rows).filter(|&row| labels[row] == fold));
+                    // Where invalid values are dropped a fold may hold none of a material's rows.
+                    if !test.is_empty() {
+                        each_fold.push(test.metrics()?);
+                    }
+                }
+                let saturated = quality::saturated(pairs, values);
+                let (mut all, mut unsaturated) = (Comparison::default(), Comparison::default());
+                for (row, &label) in labels.iter().enumerate() {
+                    all.extend(&fits[label], iter::once(row));
+                    if saturated.binary_search(&row).is_err() {
+                        unsaturated.extend(&fits[label], iter::once(row));
+                    }
+                }
+                let all = all.metrics()?;
+                Ok(Scores {
+                    train: train.metrics()?,
+                    held_out: all,
+                    held_out_fold_mean: Metrics::mean(&each_fold).unwrap_or(all),
+                    held_out_unsaturated: unsaturated.metrics()?,
+                    noise_floor: NoiseFloor::of(&exchanged, values),
+                    saturated,
+                })
+            });
         let scores = scores.collect::<Result<_>>()?;
         Ok((held_out, scores))
-    }
-
-    fn select(&self, rows: &[usize]) -> (Vec<Pair>, Array2<f64>) {
-        let pairs = rows.iter().map(|&row| self.pairs[row]).collect();
-        (pairs, self.values.select(Axis(0), rows))
-    }
-
-    /// The metrics of a column over all rows but these, which never are all.
-    fn without(&self, rows: &[usize], predicted: &Array2<f64>, column: usize) -> Result<Metrics> {
-        let left: Vec<usize> = (0..self.rows.len())
-            .filter(|row| rows.binary_search(row).is_err())
-            .collect();
-        let (pairs, truth) = self.select(&left);
-        let predicted = predicted.select(Axis(0), &left);
-        Metrics::of(&pairs, one(&predicted, column), one(&truth, column))
-    }
-}
-
-/// One column, still of two dimensions.
-fn one(values: &Array2<f64>, column: usize) -> ArrayView2<'_, f64> {
-    values.slice_axis(Axis(1), Slice::from(column..=column))
-}
-
-/// Predictions of the rows that each fold trained on, and the truth.
-#[derive(Default)]
-struct Training {
-    pairs: Vec<Pair>,
-    predicted: Vec<Array2<f64>>,
-    truth: Vec<Array2<f64>>,
-}
-
-impl Training {
-    fn push(&mut self, pairs: &[Pair], predicted: Array2<f64>, truth: Array2<f64>) {
-        self.pairs.extend_from_slice(pairs);
-        self.predicted.push(predicted);
-        self.truth.push(truth);
-    }
-
-    /// The metrics of a column over all folds.
-    fn metrics(&self, column: usize) -> Result<Metrics> {
-        let join = |parts: &[Array2<f64>]| {
-            let values = parts.iter().flat_map(|part| part.column(column).to_vec());
-            values.collect::<Array1<f64>>().insert_axis(Axis(1))
-        };
-        let (predicted, truth) = (join(&self.predicted), join(&self.truth));
-        Metrics::of(&self.pairs, predicted.view(), truth.view())
     }
 }

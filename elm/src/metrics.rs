@@ -15,6 +15,7 @@ use ndarray::{Array1, ArrayRef1, ArrayView1, ArrayView2, Axis};
 
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
+use crate::solve::frame::power_of_two;
 
 /// Root mean squared error.
 ///
@@ -23,8 +24,8 @@ use crate::scalar::Scalar;
 /// [`Error::NotFinite`] for a NaN or infinity.
 pub fn rmse<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<f64> {
     check(predicted, truth)?;
-    let errors: Vec<f64> = pairs(predicted, truth).map(|(p, t)| p - t).collect();
-    Ok(scaled_root_mean_square(errors.iter().map(|&e| (e, 1.0))))
+    let errors = pairs(predicted, truth).map(|(p, t)| (p - t, 1.0));
+    Ok(scaled_root_mean_square(errors))
 }
 
 /// Mean absolute error.
@@ -53,17 +54,17 @@ pub fn correlation<A: Scalar>(
 ) -> Result<Option<f64>> {
     check(predicted, truth)?;
     let n = truth.len() as f64;
-    // In units of the largest, as squares of 1e200 and of 1e-200 are out of range.
-    let scaled = |x: &ArrayRef1<A>| -> Vec<f64> {
+    // Scaled, as squares of 1e200 and of 1e-200 are out of range.
+    let factor = |x: &ArrayRef1<A>| {
         let largest = x.iter().fold(0.0, |m: f64, v| m.max(v.as_f64().abs()));
-        let unit = if largest > 0.0 { largest } else { 1.0 };
-        x.iter().map(|v| v.as_f64() / unit).collect()
+        power_of_two(largest).recip()
     };
-    let (predicted, truth) = (scaled(predicted), scaled(truth));
-    let mean = |x: &[f64]| x.iter().sum::<f64>() / n;
-    let (mean_p, mean_t) = (mean(&predicted), mean(&truth));
+    let (factor_p, factor_t) = (factor(predicted), factor(truth));
+    let scaled = || pairs(predicted, truth).map(|(p, t)| (p * factor_p, t * factor_t));
+    let (sum_p, sum_t) = scaled().fold((0.0, 0.0), |(sp, st), (p, t)| (sp + p, st + t));
+    let (mean_p, mean_t) = (sum_p / n, sum_t / n);
     let (mut pp, mut tt, mut pt) = (0.0, 0.0, 0.0);
-    for (p, t) in predicted.iter().zip(&truth) {
+    for (p, t) in scaled() {
         let (p, t) = (p - mean_p, t - mean_t);
         pp += p * p;
         tt += t * t;
@@ -93,7 +94,7 @@ pub(crate) fn root_mean_squares<A: Scalar>(values: ArrayView2<'_, A>) -> Array1<
     })
 }
 
-/// Of values and weights. Scaled by the largest value, as squares of 1e200 are out of range.
+/// Of values and weights. Scaled by a power of two, as squares of 1e200 are out of range.
 fn scaled_root_mean_square(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
     let largest = pairs.clone().fold(0.0, |m: f64, (value, _)| {
         // Unlike f64::max this keeps a NaN.
@@ -106,10 +107,12 @@ fn scaled_root_mean_square(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> f
     if largest == 0.0 || !largest.is_finite() {
         return largest;
     }
+    let unit = power_of_two(largest);
+    let factor = unit.recip();
     let (squares, total) = pairs.fold((0.0, 0.0), |(squares, total), (value, weight)| {
-        (squares + weight * (value / largest).powi(2), total + weight)
+        (squares + weight * (value * factor).powi(2), total + weight)
     });
-    largest * (squares / total).sqrt()
+    unit * (squares / total).sqrt()
 }
 
 fn check<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<()> {
@@ -128,6 +131,13 @@ fn check<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<()
         });
     }
     for (what, values) in [("predictions", predicted), ("truth", truth)] {
+        // A question without places is answered several values at a time.
+        if values
+            .iter()
+            .fold(true, |all, value| all & value.is_finite())
+        {
+            continue;
+        }
         if let Some(row) = values.iter().position(|value| !value.is_finite()) {
             let column = 0;
             return Err(Error::NotFinite { what, row, column });
@@ -139,7 +149,7 @@ fn check<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<()
 fn pairs<A: Scalar>(
     predicted: &ArrayRef1<A>,
     truth: &ArrayRef1<A>,
-) -> impl Iterator<Item = (f64, f64)> {
+) -> impl Iterator<Item = (f64, f64)> + Clone {
     predicted
         .iter()
         .zip(truth)
