@@ -15,6 +15,7 @@ use ndarray::{Array1, ArrayRef1, ArrayView1, ArrayView2, Axis};
 
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
+use crate::solve::check_length;
 use crate::solve::frame::power_of_two;
 
 /// Root mean squared error.
@@ -23,7 +24,14 @@ use crate::solve::frame::power_of_two;
 /// [`Error::Shape`] when the lengths differ, [`Error::Empty`] when there is nothing to compare,
 /// [`Error::NotFinite`] for a NaN or infinity.
 pub fn rmse<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<f64> {
-    check(predicted, truth)?;
+    check_lengths(predicted, truth)?;
+    let squares: f64 = pairs(predicted, truth)
+        .map(|(p, t)| (p - t) * (p - t))
+        .sum();
+    if in_range(squares) {
+        return Ok((squares / truth.len() as f64).sqrt());
+    }
+    check_finite(predicted, truth)?;
     let errors = pairs(predicted, truth).map(|(p, t)| (p - t, 1.0));
     Ok(scaled_root_mean_square(errors))
 }
@@ -34,12 +42,16 @@ pub fn rmse<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result
 /// [`Error::Shape`] when the lengths differ, [`Error::Empty`] when there is nothing to compare,
 /// [`Error::NotFinite`] for a NaN or infinity.
 pub fn mae<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<f64> {
-    check(predicted, truth)?;
+    check_lengths(predicted, truth)?;
     let n = truth.len() as f64;
+    let errors = || pairs(predicted, truth).map(|(p, t)| (p - t).abs());
+    let sum: f64 = errors().sum();
+    if sum.is_finite() {
+        return Ok(sum / n);
+    }
+    check_finite(predicted, truth)?;
     // Divided before it is summed: the sum of many errors of 1e308 is out of range.
-    Ok(pairs(predicted, truth)
-        .map(|(p, t)| (p - t).abs() / n)
-        .sum())
+    Ok(errors().map(|error| error / n).sum())
 }
 
 /// Pearson's correlation coefficient; `None` where it does not exist, that is, where one of the
@@ -52,30 +64,67 @@ pub fn correlation<A: Scalar>(
     predicted: &ArrayRef1<A>,
     truth: &ArrayRef1<A>,
 ) -> Result<Option<f64>> {
-    check(predicted, truth)?;
-    let n = truth.len() as f64;
-    // Scaled, as squares of 1e200 and of 1e-200 are out of range.
-    let factor = |x: &ArrayRef1<A>| {
-        let largest = x.iter().fold(0.0, |m: f64, v| m.max(v.as_f64().abs()));
-        power_of_two(largest).recip()
-    };
-    let (factor_p, factor_t) = (factor(predicted), factor(truth));
-    let scaled = || pairs(predicted, truth).map(|(p, t)| (p * factor_p, t * factor_t));
-    let (sum_p, sum_t) = scaled().fold((0.0, 0.0), |(sp, st), (p, t)| (sp + p, st + t));
-    let (mean_p, mean_t) = (sum_p / n, sum_t / n);
-    let (mut pp, mut tt, mut pt) = (0.0, 0.0, 0.0);
-    for (p, t) in scaled() {
-        let (p, t) = (p - mean_p, t - mean_t);
-        pp += p * p;
-        tt += t * t;
-        pt += p * t;
+    check_lengths(predicted, truth)?;
+    let mut sums = CentredSums::of(pairs(predicted, truth));
+    if !(in_range(sums.pp) && in_range(sums.tt)) {
+        check_finite(predicted, truth)?;
+        let factor = |x: &ArrayRef1<A>| {
+            let largest = x.iter().fold(0.0, |m: f64, v| m.max(v.as_f64().abs()));
+            power_of_two(largest).recip()
+        };
+        let (factor_p, factor_t) = (factor(predicted), factor(truth));
+        let scaled = pairs(predicted, truth).map(|(p, t)| (p * factor_p, t * factor_t));
+        sums = CentredSums::of(scaled);
     }
     // The mean of n equal numbers is exact to n roundings; a spread below that is no spread.
-    let is_constant = |squares: f64, mean: f64| squares.sqrt() <= n * f64::EPSILON * mean.abs();
-    if is_constant(pp, mean_p) || is_constant(tt, mean_t) {
+    let noise = truth.len() as f64 * f64::EPSILON;
+    let is_constant = |squares: f64, mean: f64| squares.sqrt() <= noise * mean.abs();
+    if is_constant(sums.pp, sums.mean_p) || is_constant(sums.tt, sums.mean_t) {
         return Ok(None);
     }
-    Ok(Some((pt / (pp.sqrt() * tt.sqrt())).clamp(-1.0, 1.0)))
+    let r = sums.pt / (sums.pp.sqrt() * sums.tt.sqrt());
+    Ok(Some(r.clamp(-1.0, 1.0)))
+}
+
+/// Of two columns the means, and the sums of squares and products about them.
+struct CentredSums {
+    mean_p: f64,
+    mean_t: f64,
+    pp: f64,
+    tt: f64,
+    pt: f64,
+}
+
+impl CentredSums {
+    fn of(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Self {
+        let (mut n, mut sum_p, mut sum_t) = (0.0, 0.0, 0.0);
+        for (p, t) in pairs.clone() {
+            n += 1.0;
+            sum_p += p;
+            sum_t += t;
+        }
+        let (mean_p, mean_t) = (sum_p / n, sum_t / n);
+        let (mut pp, mut tt, mut pt) = (0.0, 0.0, 0.0);
+        for (p, t) in pairs {
+            let (p, t) = (p - mean_p, t - mean_t);
+            pp += p * p;
+            tt += t * t;
+            pt += p * t;
+        }
+        Self {
+            mean_p,
+            mean_t,
+            pp,
+            tt,
+            pt,
+        }
+    }
+}
+
+/// Whether a sum of squares has neither overflowed nor lost what is too small to be squared; of
+/// nothing but zeros, or of a NaN, that is not known.
+fn in_range(squares: f64) -> bool {
+    (1e-200..f64::INFINITY).contains(&squares)
 }
 
 /// Root of the weighted mean of squares; 0 of nothing.
@@ -115,14 +164,8 @@ fn scaled_root_mean_square(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> f
     unit * (squares / total).sqrt()
 }
 
-fn check<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<()> {
-    if predicted.len() != truth.len() {
-        return Err(Error::Shape {
-            what: "predictions",
-            expected: truth.len(),
-            found: predicted.len(),
-        });
-    }
+fn check_lengths<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<()> {
+    check_length("predictions", predicted.len(), truth.len())?;
     if truth.is_empty() {
         return Err(Error::Empty {
             what: "truth",
@@ -130,14 +173,11 @@ fn check<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<()
             columns: 1,
         });
     }
+    Ok(())
+}
+
+fn check_finite<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<()> {
     for (what, values) in [("predictions", predicted), ("truth", truth)] {
-        // A question without places is answered several values at a time.
-        if values
-            .iter()
-            .fold(true, |all, value| all & value.is_finite())
-        {
-            continue;
-        }
         if let Some(row) = values.iter().position(|value| !value.is_finite()) {
             let column = 0;
             return Err(Error::NotFinite { what, row, column });
@@ -186,7 +226,24 @@ mod tests {
                 row: place,
                 column: 0,
             };
-            assert_eq!(rmse(&p, &zero), Err(expected));
+            assert_eq!(rmse(&p, &zero), Err(expected.clone()));
+            assert_eq!(mae(&p, &zero), Err(expected.clone()));
+            assert_eq!(correlation(&p, &zero), Err(expected));
+        }
+    }
+
+    #[test]
+    fn scale_does_not_change_a_correlation() {
+        let (p, t) = (array![1.0, 2.0, 3.0, 4.0], array![1.0, 0.0, 3.0, 8.0]);
+        let r = correlation(&p, &t).unwrap().unwrap();
+        for (a, b) in [
+            (1e-200, 1e-200),
+            (1e200, 1e-200),
+            (1e307, 1e300),
+            (1e-310, 1.0),
+        ] {
+            let found = correlation(&(&p * a), &(&t * b)).unwrap().unwrap();
+            approx::assert_relative_eq!(found, r, max_relative = 1e-12);
         }
     }
 

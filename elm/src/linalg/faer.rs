@@ -166,6 +166,19 @@ fn triangularise<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
     }
 }
 
+fn solve_upper<A: RealField + Copy + Zero>(
+    r: ArrayView2<'_, A>,
+    b: ArrayView2<'_, A>,
+) -> Result<Array2<A>, Failure> {
+    if r.diag().iter().any(Zero::is_zero) {
+        return Err(Failure::Pivot);
+    }
+    let mut x = by_columns(b);
+    let r = gapless(r);
+    triangular_solve::solve_upper_triangular_in_place(view(r.view()), view_mut(&mut x), PAR);
+    Ok(x)
+}
+
 fn solve_square<A: RealField + Copy + Zero + PartialEq>(
     a: ArrayView2<'_, A>,
     b: ArrayView2<'_, A>,
@@ -261,6 +274,13 @@ macro_rules! kernel {
                 b: ArrayView2<'_, Self>,
             ) -> Result<Triangular<Self>, Failure> {
                 Ok(triangularise(a, b))
+            }
+
+            fn solve_upper(
+                r: ArrayView2<'_, Self>,
+                b: ArrayView2<'_, Self>,
+            ) -> Result<Array2<Self>, Failure> {
+                solve_upper(r, b)
             }
 
             fn solve_square(

@@ -66,6 +66,15 @@ fn triangularise<A: Lapack<Real = A>>(
     Ok(Triangular { r, qtb, unreached })
 }
 
+fn solve_upper<A: Lapack<Real = A>>(
+    r: ArrayView2<'_, A>,
+    b: ArrayView2<'_, A>,
+) -> Result<Array2<A>, Failure> {
+    by_rows(r)
+        .solve_triangular(UPLO::Upper, Diag::NonUnit, &by_rows(b))
+        .map_err(pivot)
+}
+
 fn solve_square<A: Lapack<Real = A>>(
     a: ArrayView2<'_, A>,
     b: ArrayView2<'_, A>,
@@ -123,6 +132,14 @@ macro_rules! kernel {
             ) -> Result<Triangular<Self>, Failure> {
                 sequential();
                 triangularise(a, b)
+            }
+
+            fn solve_upper(
+                r: ArrayView2<'_, Self>,
+                b: ArrayView2<'_, Self>,
+            ) -> Result<Array2<Self>, Failure> {
+                sequential();
+                solve_upper(r, b)
             }
 
             fn solve_square(

@@ -90,6 +90,12 @@ pub trait Kernel: Sized {
         b: ArrayView2<'_, Self>,
     ) -> Result<Triangular<Self>, Failure>;
 
+    /// Solves $R X = B$ for square $R$, of which the upper half is read.
+    fn solve_upper(
+        r: ArrayView2<'_, Self>,
+        b: ArrayView2<'_, Self>,
+    ) -> Result<Array2<Self>, Failure>;
+
     /// Solves $A X = B$ for square $A$ by LU with partial pivoting.
     fn solve_square(
         a: ArrayView2<'_, Self>,
@@ -237,12 +243,25 @@ mod tests {
             let solved = f64::solve_positive(p.view(), p.dot(&x).view()).unwrap();
             assert_abs_diff_eq!(solved.x, x, epsilon = 1e-9);
             let s = f64::singular_values(a.view()).unwrap();
+            let r = Array2::from_shape_fn((n, n), |(i, j)| if i <= j { a[[i, j]] } else { 0.0 });
+            assert_abs_diff_eq!(
+                f64::solve_upper(a.view(), r.dot(&x).view()).unwrap(),
+                x,
+                epsilon = 1e-10
+            );
             assert_relative_eq!(
                 solved.inverse_trace,
                 s.mapv(|s| s.powi(-2)).sum(),
                 max_relative = 1e-11
             );
         }
+    }
+
+    #[test]
+    fn a_triangle_without_a_pivot_is_not_solved() {
+        let r: Array2<f64> = array![[1.0, 2.0], [0.0, 0.0]];
+        let solved = f64::solve_upper(r.view(), Array2::eye(2).view());
+        assert_eq!(solved.unwrap_err(), Failure::Pivot);
     }
 
     #[test]

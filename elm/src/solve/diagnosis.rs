@@ -25,6 +25,8 @@ pub enum Route {
     DualGram,
     /// None: the weights were given.
     Given,
+    /// QR, then back substitution.
+    Qr,
 }
 
 /// Why a solver took its [`Route`]. Between the two forms of a route the shape of the matrix
@@ -50,6 +52,9 @@ pub enum Reason {
     Mean,
     /// Nothing was solved: the weights come from elsewhere.
     GivenWeights,
+    /// The triangle of the QR factorisation is far from losing a direction, so that the
+    /// pseudo-inverse is the plain least-squares solution.
+    FullRank,
 }
 
 /// The state of the problem that was solved, for the user to judge the answer by.

@@ -3,12 +3,18 @@
 use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
 
-use super::spectrum::Spectrum;
-use super::{LeastSquares, Reason, Solution};
+use super::frame::{Frame, Prepared};
+use super::lanczos::largest_eigenvalue;
+use super::spectrum::{Spectrum, norm, rounding};
+use super::{Diagnosis, LeastSquares, Reason, Route, Solution};
 use crate::error::{Error, Result};
+use crate::linalg::Triangular;
 use crate::scalar::Scalar;
 
-/// The least-squares solution of minimum norm, by singular values.
+/// The least-squares solution of minimum norm.
+///
+/// By QR where the matrix clearly has full rank; else by singular values, at several times the
+/// cost.
 ///
 /// Directions whose singular value is at most `cutoff` times the largest are left out. Without a
 /// cut-off of one's own only those at the level of rounding error are, which is the paper's plain
@@ -61,14 +67,22 @@ impl PseudoInverse {
     }
 
     pub(super) fn solve<A: Scalar>(self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
-        Ok(self.solve_spectrum(&Spectrum::new(problem)?))
+        let prepared = Prepared::new(problem);
+        let (hidden, targets) = (prepared.hidden.view(), prepared.targets.view());
+        if hidden.nrows() < hidden.ncols() {
+            return Ok(self.solve_spectrum(&Spectrum::from_prepared(prepared)?));
+        }
+        let triangle = A::triangularise(hidden, targets)?;
+        if let Some(solution) = self.solve_triangle(&triangle, &prepared.frame) {
+            return Ok(solution);
+        }
+        let lengths = prepared.frame.lengths(hidden);
+        let spectrum = Spectrum::of_triangle(triangle, lengths, prepared.frame)?;
+        Ok(self.solve_spectrum(&spectrum))
     }
 
     pub(super) fn solve_spectrum<A: Scalar>(self, spectrum: &Spectrum<A>) -> Solution<A> {
-        let level = spectrum.level();
-        let cutoff = self
-            .cutoff
-            .map_or(level, |cutoff| A::from_f64(cutoff).max(level));
+        let cutoff = self.effective_cutoff(spectrum.level());
         let rank = spectrum.rank(cutoff);
         let gain = Array2::from_shape_fn((spectrum.s.len(), 1), |(j, _)| {
             if j < rank {
@@ -79,5 +93,61 @@ impl PseudoInverse {
         });
         let lambda = vec![0.0; spectrum.c.len_of(Axis(1))];
         spectrum.solution(&gain, cutoff, Reason::RankDecision, lambda, None)
+    }
+
+    fn effective_cutoff<A: Scalar>(self, level: A) -> A {
+        self.cutoff
+            .map_or(level, |cutoff| A::from_f64(cutoff).max(level))
+    }
+
+    /// The plain least-squares solution, where every direction is well above the cut-off.
+    fn solve_triangle<A: Scalar>(
+        self,
+        triangle: &Triangular<A>,
+        frame: &Frame<A>,
+    ) -> Option<Solution<A>> {
+        // The extreme singular values are known to a few digits here, and to many elsewhere.
+        const CLEAR: f64 = 2.0;
+        let r = triangle.r.view();
+        let neurons = r.ncols();
+        let inverse = A::solve_upper(r, Array2::eye(neurons).view()).ok()?;
+        if !inverse.iter().all(|value| value.is_finite()) {
+            return None;
+        }
+        let largest = largest_eigenvalue(&A::gram(r))?.sqrt();
+        let smallest = largest_eigenvalue(&A::gram(inverse.t()))?.sqrt().recip();
+        let cutoff = self.effective_cutoff(rounding(frame.rows, neurons));
+        if smallest <= A::from_f64(CLEAR) * cutoff * largest {
+            return None;
+        }
+        let beta = frame.restore(A::solve_upper(r, triangle.qtb.view()).ok()?);
+        let outputs = beta.ncols();
+        let spanned = frame.spanned_by(neurons);
+        let residual = |&squares: &A| {
+            if spanned {
+                0.0
+            } else {
+                squares.as_f64().sqrt()
+            }
+        };
+        let freedom = neurons as f64 + f64::from(u8::from(frame.intercept));
+        let diagnosis = Diagnosis {
+            route: Route::Qr,
+            reason: Reason::FullRank,
+            rank: Some(neurons),
+            condition: Some((largest / smallest).as_f64()),
+            largest_singular_value: frame.outer_singular_value(largest),
+            smallest_singular_value: Some(frame.outer_singular_value(smallest)),
+            lambda: vec![0.0; outputs],
+            degrees_of_freedom: vec![freedom; outputs],
+            residual_norm: frame.outer_residual_norms(triangle.unreached.iter().map(residual)),
+            beta_norm: beta.columns().into_iter().map(norm).collect(),
+            leave_one_out: None,
+        };
+        Some(Solution {
+            intercept: frame.constant(&beta),
+            beta,
+            diagnosis,
+        })
     }
 }

@@ -63,20 +63,8 @@ impl<A: Scalar> Spectrum<A> {
         let lengths = frame.lengths(hidden.view());
         // Below twice as many rows as columns QR first costs more than it saves.
         if hidden.nrows() >= 2 * hidden.ncols() {
-            let Triangular { r, qtb, unreached } = A::triangularise(hidden.view(), targets.view())?;
-            let Svd { u, s, vt } = truncate(A::svd(r.view())?, frame.rows);
-            let c = A::product(u.t(), qtb.view());
-            let dropped = squares(qtb.view()) - squares(c.view());
-            let unreached = unreached + dropped.mapv(|d| d.max(A::zero()));
-            return Ok(Self {
-                route: Route::QrSvd,
-                s,
-                vt,
-                c,
-                unreached,
-                lengths,
-                frame,
-            });
+            let triangle = A::triangularise(hidden.view(), targets.view())?;
+            return Self::of_triangle(triangle, lengths, frame);
         }
         let Svd { u, s, vt } = truncate(A::svd(hidden.view())?, frame.rows);
         let c = A::product(u.t(), targets.view());
@@ -91,6 +79,32 @@ impl<A: Scalar> Spectrum<A> {
             vt,
             c,
             unreached: squares(residual.view()),
+            lengths,
+            frame,
+        })
+    }
+
+    /// From the triangle of a QR factorisation; `lengths` as in [`Frame::lengths`].
+    pub(crate) fn of_triangle(
+        triangle: Triangular<A>,
+        lengths: Array1<A>,
+        frame: Frame<A>,
+    ) -> Result<Self> {
+        let Triangular { r, qtb, unreached } = triangle;
+        let Svd { u, s, vt } = truncate(A::svd(r.view())?, frame.rows);
+        let c = A::product(u.t(), qtb.view());
+        let unreached = if frame.spanned_by(s.len()) {
+            Array1::zeros(unreached.len())
+        } else {
+            let dropped = squares(qtb.view()) - squares(c.view());
+            unreached + dropped.mapv(|d| d.max(A::zero()))
+        };
+        Ok(Self {
+            route: Route::QrSvd,
+            s,
+            vt,
+            c,
+            unreached,
             lengths,
             frame,
         })
