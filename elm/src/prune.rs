@@ -60,7 +60,7 @@ use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis, concatena
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::linalg::{Kernel, Triangular};
+use crate::linalg::{Kernel, Symmetric, Triangular};
 use crate::model::{CheckedParams, Drawn, ElmParams, Targets};
 use crate::network::Elm;
 use crate::scalar::Scalar;
@@ -312,7 +312,8 @@ impl Root {
         let squares = lengths.collect::<Array1<f64>>() + &unreached;
         // The relative strength and what it is relative to; nothing where no column varies.
         let strength = if let Lambda::Relative(relative) = ridge.lambda() {
-            largest_eigenvalue(&f64::gram(hidden.view())).map(|largest| (relative, largest))
+            let gram = Symmetric::of_lower(&f64::gram(hidden.view()));
+            largest_eigenvalue(&gram).map(|largest| (relative, largest))
         } else {
             let spectrum = Spectrum::from_triangle(
                 Prepared {

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
+use crate::solve::frame::power_of_two;
 use crate::solve::{check_length, check_matrix};
 
 /// Subtracts each input's mean and divides by its standard deviation (with divisor $n$).
@@ -93,11 +94,54 @@ impl<A: Scalar> Scaler<A> {
 
     /// Measures the columns of `x`, shape (rows, inputs), which must be finite and not empty.
     pub(crate) fn measure(x: ArrayView2<'_, A>) -> Self {
-        let (mean, factor): (Vec<_>, Vec<_>) = x.columns().into_iter().map(mean_and_factor).unzip();
-        Self {
-            mean: mean.into(),
-            factor: factor.into(),
+        let n = A::from_f64(x.nrows() as f64);
+        let zeros = || Array1::<A>::zeros(x.ncols());
+        // Row by row, so that the sums of all columns grow side by side.
+        let mut unit = zeros();
+        for row in x.rows() {
+            Zip::from(&mut unit)
+                .and(row)
+                .for_each(|largest, &x| *largest = largest.max(x.abs()));
         }
+        unit.mapv_inplace(power_of_two);
+        let into_range = unit.mapv(A::recip);
+        let mut mean = zeros();
+        for row in x.rows() {
+            Zip::from(&mut mean)
+                .and(row)
+                .and(&into_range)
+                .for_each(|sum, &x, &factor| *sum += x * factor);
+        }
+        mean /= n;
+        let mut variance = zeros();
+        for row in x.rows() {
+            Zip::from(&mut variance)
+                .and(row)
+                .and(&into_range)
+                .and(&mean)
+                .for_each(|sum, &x, &factor, &mean| {
+                    let apart = x * factor - mean;
+                    *sum += apart * apart;
+                });
+        }
+        variance /= n;
+        let factor =
+            Zip::from(&variance)
+                .and(&mean)
+                .and(&unit)
+                .map_collect(|variance, mean, &unit| {
+                    let deviation = variance.sqrt();
+                    let factor = (deviation * unit).recip();
+                    // Below this the spread is rounding of a constant.
+                    let constant = deviation <= A::from_f64(8.0) * A::epsilon() * mean.abs();
+                    if constant || !factor.is_finite() {
+                        A::zero()
+                    } else {
+                        factor
+                    }
+                });
+        mean *= &unit;
+        Self { mean, factor }
     }
 
     /// The standardised inputs, shape (rows, inputs).
@@ -141,32 +185,6 @@ impl<A: Scalar> Scaler<A> {
     #[must_use]
     pub fn factor(&self) -> ArrayView1<'_, A> {
         self.factor.view()
-    }
-}
-
-/// Both computed on the column divided by its largest magnitude, so that neither 1e300 nor 1e-300
-/// leaves the range of the type when squared.
-fn mean_and_factor<A: Scalar>(column: ArrayView1<'_, A>) -> (A, A) {
-    let largest = column.iter().fold(A::zero(), |m, x| m.max(x.abs()));
-    if largest == A::zero() {
-        return (A::zero(), A::zero());
-    }
-    // Division, not multiplication by 1 / largest: that is infinite for a subnormal.
-    let n = A::from_f64(column.len() as f64);
-    let mean = column.iter().map(|&x| x / largest).sum::<A>() / n;
-    let variance = column
-        .iter()
-        .map(|&x| (x / largest - mean).powi(2))
-        .sum::<A>()
-        / n;
-    let deviation = variance.sqrt();
-    // Below this the spread is rounding of a constant.
-    let constant = deviation <= A::from_f64(8.0) * A::epsilon() * mean.abs();
-    let factor = A::one() / (deviation * largest);
-    if constant || !factor.is_finite() {
-        (mean * largest, A::zero())
-    } else {
-        (mean * largest, factor)
     }
 }
 

@@ -16,7 +16,7 @@ compile_error!("elm-learn needs a linear algebra back end: feature `faer` or `op
 use ndarray::{Array1, Array2, ArrayView2, ShapeBuilder};
 use num_traits::Zero;
 
-pub(crate) use symmetric::symmetric_product;
+pub(crate) use symmetric::Symmetric;
 
 /// The linear algebra back end that this build uses, `"faer"` or `"openblas"`.
 #[must_use]

@@ -1,33 +1,73 @@
-//! Products of a symmetric matrix, of which one half is there, with a vector.
+//! Products of a symmetric matrix with vectors.
 
-use ndarray::{Array1, Array2};
+use aligned_vec::{AVec, ConstAlign};
+use ndarray::{Array1, Array2, ArrayView2};
 use pulp::{Simd, WithSimd};
 
 use crate::scalar::Scalar;
 use crate::simd::{Lanes, Level};
 
-/// $A x$ for the symmetric matrix whose lower half is that of `lower`, which lies by columns.
-pub(crate) fn symmetric_product<A: Scalar>(lower: &Array2<A>, x: &Array1<A>) -> Array1<A> {
-    let mut y = Array1::zeros(x.len());
-    let columns = lower.t();
-    if let (Some(lower), Some(x), Some(sums)) = (columns.to_slice(), x.as_slice(), y.as_slice_mut())
-    {
-        Level::best().run(Product { lower, x, y: sums });
-        return y;
-    }
-    for (j, column) in lower.columns().into_iter().enumerate() {
-        y[j] += column[j] * x[j];
-        for i in j + 1..x.len() {
-            y[i] += column[i] * x[j];
-            y[j] += column[i] * x[i];
+/// Registers of sums that are taken together.
+const TOGETHER: usize = 4;
+
+type Aligned<A> = AVec<A, ConstAlign<64>>;
+
+/// A symmetric matrix, whole, laid out for products with vectors.
+pub(crate) struct Symmetric<A: Scalar> {
+    n: usize,
+    /// By columns, each filled up with zeros to whole groups of registers.
+    columns: Aligned<A>,
+}
+
+impl<A: Scalar> Symmetric<A> {
+    /// Of the lower half of a square matrix.
+    pub(crate) fn of_lower(lower: &Array2<A>) -> Self {
+        let n = lower.nrows();
+        let stride = stride::<A>(n);
+        let mut columns = AVec::from_iter(64, std::iter::repeat_n(A::zero(), n * stride));
+        for (j, column) in lower.columns().into_iter().enumerate() {
+            for (i, &value) in column.iter().enumerate().skip(j) {
+                columns[j * stride + i] = value;
+                columns[i * stride + j] = value;
+            }
         }
+        Self { n, columns }
     }
-    y
+
+    /// Number of rows, and of columns.
+    pub(crate) fn len(&self) -> usize {
+        self.n
+    }
+
+    /// The matrix itself.
+    pub(crate) fn whole(&self) -> Array2<A> {
+        let view = ArrayView2::from_shape((self.n, stride::<A>(self.n)), &self.columns);
+        view.map_or_else(
+            |_| Array2::zeros((0, 0)),
+            |view| view.slice(ndarray::s![.., ..self.n]).to_owned(),
+        )
+    }
+
+    /// The product with a vector of as many values. The same bits wherever multiply-add is fused.
+    pub(crate) fn product(&self, x: &Array1<A>) -> Array1<A> {
+        let stride = stride::<A>(self.n);
+        let mut y: Aligned<A> = AVec::from_iter(64, std::iter::repeat_n(A::zero(), stride));
+        Level::best().run(Product {
+            columns: &self.columns,
+            x,
+            y: &mut y,
+        });
+        y.iter().copied().take(self.n).collect()
+    }
+}
+
+fn stride<A: Scalar>(n: usize) -> usize {
+    n.next_multiple_of(TOGETHER * A::LINE)
 }
 
 struct Product<'a, A: Scalar> {
-    lower: &'a [A],
-    x: &'a [A],
+    columns: &'a [A],
+    x: &'a Array1<A>,
     y: &'a mut [A],
 }
 
@@ -36,26 +76,20 @@ impl<A: Scalar> WithSimd for Product<'_, A> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let n = self.x.len();
-        for (j, column) in self.lower.chunks_exact(n.max(1)).enumerate() {
-            // Every entry is read once, for its row and for its column.
-            let (column, column_rest) = A::registers::<S>(&column[j + 1..]);
-            let (x, x_rest) = A::registers::<S>(&self.x[j + 1..]);
-            let (y, y_rest) = A::registers_mut::<S>(&mut self.y[j + 1..]);
-            let own = self.x[j];
-            let factor = Lanes::<S, A>::splat(simd, own);
-            let mut sums = [Lanes::<S, A>::splat(simd, A::ZERO); 2];
-            for (index, ((&a, &x), y)) in column.iter().zip(x).zip(y).enumerate() {
-                let a = Lanes::new(simd, a);
-                sums[index % 2] = a.mul_add(Lanes::new(simd, x), sums[index % 2]);
-                *y = a.mul_add(factor, Lanes::new(simd, *y)).register();
+        let stride = self.y.len();
+        let y = A::registers_mut::<S>(self.y).0;
+        for (group, y) in y.chunks_exact_mut(TOGETHER).enumerate() {
+            let mut sums = [Lanes::<S, A>::splat(simd, A::ZERO); TOGETHER];
+            for (column, &x) in self.columns.chunks_exact(stride).zip(self.x) {
+                let column = &A::registers::<S>(column).0[group * TOGETHER..][..TOGETHER];
+                let x = Lanes::splat(simd, x);
+                for (sum, &a) in sums.iter_mut().zip(column) {
+                    *sum = Lanes::new(simd, a).mul_add(x, *sum);
+                }
             }
-            let mut sum = (sums[0] + sums[1]).sum();
-            for ((&a, &x), y) in column_rest.iter().zip(x_rest).zip(y_rest) {
-                sum += a * x;
-                *y += a * own;
+            for (y, sum) in y.iter_mut().zip(sums) {
+                *y = sum.register();
             }
-            self.y[j] += self.lower[j * n + j] * own + sum;
         }
     }
 }
@@ -67,16 +101,20 @@ mod tests {
 
     #[test]
     fn one_half_gives_the_product_of_the_whole() {
-        for n in [1, 2, 5, 33, 70] {
+        for n in [1, 2, 5, 32, 33, 70] {
             let value = |i: usize, j: usize| ((3 * i.max(j) + 7 * i.min(j)) % 11) as f64 - 4.0;
             let whole = Array2::from_shape_fn((n, n), |(i, j)| value(i, j));
             let x = Array1::from_shape_fn(n, |i| (i % 5) as f64 - 2.0);
             // Integers, so that no sum rounds.
             let half = |(i, j)| if i >= j { value(i, j) } else { f64::NAN };
-            let by_columns = Array2::from_shape_fn((n, n).f(), half);
-            let by_rows = Array2::from_shape_fn((n, n), half);
-            assert_eq!(symmetric_product(&by_columns, &x), whole.dot(&x));
-            assert_eq!(symmetric_product(&by_rows, &x), whole.dot(&x));
+            for lower in [
+                Array2::from_shape_fn((n, n).f(), half),
+                Array2::from_shape_fn((n, n), half),
+            ] {
+                let symmetric = Symmetric::of_lower(&lower);
+                assert_eq!(symmetric.product(&x), whole.dot(&x));
+                assert_eq!(symmetric.whole(), whole);
+            }
         }
     }
 }

@@ -153,12 +153,6 @@ impl<S: Simd, A: Real> Lanes<S, A> {
         A::reduce_max(self.simd, self.register)
     }
 
-    /// The sum of all lanes, in an order that differs between processors.
-    #[inline(always)]
-    pub(crate) fn sum(self) -> A {
-        A::reduce_sum(self.simd, self.register)
-    }
-
     /// The integer nearest to `self * factor`, for magnitudes below 2^21 (`f32`) or 2^50 (`f64`).
     #[inline(always)]
     pub(crate) fn round_product(self, factor: A) -> Self {

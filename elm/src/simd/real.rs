@@ -73,7 +73,6 @@ pub trait Real: Copy + Send + Sync + 'static {
         b: Self::Register<S>,
     ) -> Self::Register<S>;
     fn reduce_max<S: Simd>(simd: S, a: Self::Register<S>) -> Self;
-    fn reduce_sum<S: Simd>(simd: S, a: Self::Register<S>) -> Self;
     /// Whole registers of a slice and what is left over.
     fn registers<S: Simd>(slice: &[Self]) -> (&[Self::Register<S>], &[Self]);
     /// Whole registers of a slice and what is left over.
@@ -144,11 +143,6 @@ impl Real for f64 {
     #[inline(always)]
     fn reduce_max<S: Simd>(simd: S, a: S::f64s) -> Self {
         simd.reduce_max_f64s(a)
-    }
-
-    #[inline(always)]
-    fn reduce_sum<S: Simd>(simd: S, a: S::f64s) -> Self {
-        simd.reduce_sum_f64s(a)
     }
 
     #[inline(always)]
@@ -237,11 +231,6 @@ impl Real for f32 {
     #[inline(always)]
     fn reduce_max<S: Simd>(simd: S, a: S::f32s) -> Self {
         simd.reduce_max_f32s(a)
-    }
-
-    #[inline(always)]
-    fn reduce_sum<S: Simd>(simd: S, a: S::f32s) -> Self {
-        simd.reduce_sum_f32s(a)
     }
 
     #[inline(always)]

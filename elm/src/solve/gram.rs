@@ -18,7 +18,7 @@ use super::lanczos::largest_eigenvalue;
 use super::moments::{Moments, RowSource};
 use super::spectrum::norm;
 use crate::error::Result;
-use crate::linalg::{Positive, symmetric_product};
+use crate::linalg::{Positive, Symmetric};
 use crate::scalar::Scalar;
 
 /// The relative error that output weights may have by this route.
@@ -54,7 +54,8 @@ pub(super) fn solve_rows<A: Scalar>(
     if !moments.in_range() {
         return Ok(None);
     }
-    let Some(largest) = largest_eigenvalue(&moments.gram) else {
+    let gram = Symmetric::of_lower(&moments.gram);
+    let Some(largest) = largest_eigenvalue(&gram) else {
         return Ok(None);
     };
     // With the correction c, errors are about epsilon (1 + c / s_1^2) / lambda.
@@ -74,7 +75,7 @@ pub(super) fn solve_rows<A: Scalar>(
     let mut squares = Array1::zeros(x.ncols());
     for (output, square) in squares.iter_mut().enumerate() {
         let (beta, right) = (x.column(output).to_owned(), moments.right.column(output));
-        let fitted = symmetric_product(&moments.gram, &beta);
+        let fitted = gram.product(&beta);
         *square = moments.squares[output] - beta.dot(&(&right * A::from_f64(2.0) - fitted));
     }
     let trusted = A::from_f64(100.0) * A::epsilon().sqrt();
@@ -107,7 +108,7 @@ pub(super) fn solve<A: Scalar>(prepared: &Prepared<A>, lambda: f64) -> Option<So
     } else {
         A::gram(hidden.view())
     };
-    let largest = largest_eigenvalue(&gram)?;
+    let largest = largest_eigenvalue(&Symmetric::of_lower(&gram))?;
     let absolute = A::from_f64(lambda) * largest;
     let mut diagonal = gram.diag_mut();
     diagonal += absolute;

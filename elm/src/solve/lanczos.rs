@@ -1,37 +1,37 @@
 //! The largest eigenvalue of a symmetric matrix by Lanczos iteration.
 
-use ndarray::{Array1, Array2, s};
+use ndarray::{Array1, ArrayView2};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::linalg::symmetric_product;
+use crate::linalg::Symmetric;
 use crate::scalar::Scalar;
 
 /// The largest eigenvalue of a symmetric matrix without negative ones, to 1e-10 of itself (32
 /// epsilon in `f32`), by Lanczos iteration with full reorthogonalisation; `None` for a zero
-/// matrix. Of the matrix, which lies by columns, the lower half is read.
+/// matrix.
 ///
 /// With a residual $r$ an eigenvalue lies within $r$ of the Ritz value, and within $r^2$ over the
 /// distance to all others (Parlett, The Symmetric Eigenvalue Problem, 1998, ch. 4, 11 and 13); a
 /// random start makes it the largest. That distance is taken from the next Ritz value, with a
 /// factor of 100 for what that one may be short of. Eigenvalues that agree so nearly that the
 /// iteration has not told them apart give one between them, to a hundred times the error above.
-pub(crate) fn largest_eigenvalue<A: Scalar>(lower: &Array2<A>) -> Option<A> {
+pub(crate) fn largest_eigenvalue<A: Scalar>(matrix: &Symmetric<A>) -> Option<A> {
     const STEPS: usize = 80;
-    let n = lower.nrows();
+    let n = matrix.len();
     let steps = STEPS.min(n);
     let tolerance = 1e-10_f64.max(32.0 * A::epsilon().as_f64());
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let start = Array1::from_shape_simple_fn(n, || A::from_f64(rng.random_range(-1.0..1.0)));
-    let mut basis = Array2::<A>::zeros((steps, n));
+    let mut basis: Vec<A> = Vec::new();
     let mut next = &start / start.dot(&start).sqrt();
     let mut small = Tridiagonal::default();
     let mut value = 0.0;
     for step in 0..steps {
-        basis.row_mut(step).assign(&next);
-        next = symmetric_product(lower, &next);
-        small.diagonal.push(basis.row(step).dot(&next).as_f64());
-        let known = basis.slice(s![..=step, ..]);
+        basis.extend(&next);
+        let known = ArrayView2::from_shape((step + 1, n), &basis).ok()?;
+        next = matrix.product(&next);
+        small.diagonal.push(known.row(step).dot(&next).as_f64());
         for _ in 0..2 {
             let shares = known.dot(&next);
             next -= &shares.dot(&known);
@@ -57,8 +57,7 @@ pub(crate) fn largest_eigenvalue<A: Scalar>(lower: &Array2<A>) -> Option<A> {
         next /= rest;
     }
     // Many eigenvalues crowd at the top: all of them, then.
-    let whole = Array2::from_shape_fn((n, n), |(i, j)| lower[[i.max(j), i.min(j)]]);
-    let all = A::singular_values(whole.view()).ok()?;
+    let all = A::singular_values(matrix.whole().view()).ok()?;
     (all[0] > A::zero()).then_some(all[0])
 }
 
@@ -144,7 +143,11 @@ impl Tridiagonal {
 mod tests {
     use super::*;
     use crate::linalg::Kernel;
-    use ndarray::ShapeBuilder;
+
+    fn largest(lower: &Array2<f64>) -> Option<f64> {
+        largest_eigenvalue(&Symmetric::of_lower(lower))
+    }
+    use ndarray::{Array2, ShapeBuilder};
     use ndarray_rand::RandomExt;
     use ndarray_rand::rand_distr::StandardNormal;
 
@@ -153,17 +156,17 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         for (rows, columns) in [(1, 1), (5, 2), (60, 59), (300, 100), (120, 119)] {
             let a: Array2<f64> = Array2::random_using((rows, columns), StandardNormal, &mut rng);
-            let found = largest_eigenvalue(&f64::gram(a.view())).unwrap();
+            let found = largest(&f64::gram(a.view())).unwrap();
             let s = f64::singular_values(a.view()).unwrap()[0];
             approx::assert_relative_eq!(found, s * s, max_relative = 1e-10);
         }
         // All equal, and none at all.
-        assert_eq!(largest_eigenvalue(&Array2::<f64>::eye(200)), Some(1.0));
-        assert_eq!(largest_eigenvalue(&Array2::<f64>::zeros((9, 9).f())), None);
+        assert_eq!(largest(&Array2::<f64>::eye(200)), Some(1.0));
+        assert_eq!(largest(&Array2::<f64>::zeros((9, 9).f())), None);
         // 1 and 1 - 1e-12 many times: nothing to tell apart, and either is right to 1e-10.
         for step in [1e-3, 1e-5, 1e-12] {
             let crowd = Array1::from_shape_fn(300, |i| 1.0 - i as f64 * step);
-            let found = largest_eigenvalue(&Array2::from_diag(&crowd)).unwrap();
+            let found = largest(&Array2::from_diag(&crowd)).unwrap();
             approx::assert_relative_eq!(found, 1.0, max_relative = 1e-10);
         }
     }
@@ -176,7 +179,7 @@ mod tests {
                 20 => 1.0 - gap,
                 _ => 0.9_f64.powf((i + 1) as f64),
             });
-            let found = largest_eigenvalue(&Array2::from_diag(&spectrum)).unwrap();
+            let found = largest(&Array2::from_diag(&spectrum)).unwrap();
             let bound = if gap < 1e-7 { 1e-8 } else { 1e-10 };
             approx::assert_relative_eq!(found, 1.0, max_relative = bound);
         }

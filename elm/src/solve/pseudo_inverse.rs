@@ -8,7 +8,7 @@ use super::lanczos::largest_eigenvalue;
 use super::spectrum::{Spectrum, norm, rounding};
 use super::{Diagnosis, LeastSquares, Reason, Route, Solution};
 use crate::error::{Error, Result};
-use crate::linalg::Triangular;
+use crate::linalg::{Symmetric, Triangular};
 use crate::scalar::Scalar;
 
 /// The least-squares solution of minimum norm.
@@ -114,8 +114,9 @@ impl PseudoInverse {
         if !inverse.iter().all(|value| value.is_finite()) {
             return None;
         }
-        let largest = largest_eigenvalue(&A::gram(r))?.sqrt();
-        let smallest = largest_eigenvalue(&A::gram(inverse.t()))?.sqrt().recip();
+        let norm_of = |gram| largest_eigenvalue(&Symmetric::of_lower(&gram)).map(A::sqrt);
+        let largest = norm_of(A::gram(r))?;
+        let smallest = norm_of(A::gram(inverse.t()))?.recip();
         let cutoff = self.effective_cutoff(rounding(frame.rows, neurons));
         if smallest <= A::from_f64(CLEAR) * cutoff * largest {
             return None;
