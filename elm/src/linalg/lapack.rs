@@ -150,7 +150,7 @@ macro_rules! kernel {
                 solve_square(a, b)
             }
 
-            fn add_gram(a: ArrayView2<'_, Self>, sum: &mut Array2<Self>) {
+            fn add_gram(a: ArrayView2<'_, Self>, sum: &mut Array2<Self>, _: &mut Vec<Self>) {
                 sequential();
                 general_mat_mul(1.0, &a.t(), &a, 1.0, sum);
             }

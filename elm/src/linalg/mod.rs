@@ -103,8 +103,9 @@ pub trait Kernel: Sized {
     ) -> Result<Array2<Self>, Failure>;
 
     /// Adds $A^T A$ to the lower half of `sum`, a square matrix that lies by columns. What the
-    /// upper half is afterwards is not said.
-    fn add_gram(a: ArrayView2<'_, Self>, sum: &mut Array2<Self>);
+    /// upper half is afterwards is not said. What is in `scratch` does not matter; kept from one
+    /// call to the next it saves allocations.
+    fn add_gram(a: ArrayView2<'_, Self>, sum: &mut Array2<Self>, scratch: &mut Vec<Self>);
 
     /// $A^T A$, of which the lower half is to be read, by columns.
     fn gram(a: ArrayView2<'_, Self>) -> Array2<Self>
@@ -112,7 +113,7 @@ pub trait Kernel: Sized {
         Self: Copy + Zero,
     {
         let mut sum = Array2::zeros((a.ncols(), a.ncols()).f());
-        Self::add_gram(a, &mut sum);
+        Self::add_gram(a, &mut sum, &mut Vec::new());
         sum
     }
 
@@ -237,7 +238,7 @@ mod tests {
             let p = a.t().dot(&a);
             let mut gram = f64::gram(a.view());
             assert_abs_diff_eq!(both_halves(&gram), p, epsilon = 1e-10);
-            f64::add_gram(a.t(), &mut gram);
+            f64::add_gram(a.t(), &mut gram, &mut Vec::new());
             let sum = &p + &a.dot(&a.t());
             assert_abs_diff_eq!(both_halves(&gram), sum, epsilon = 1e-10);
             let solved = f64::solve_positive(p.view(), p.dot(&x).view()).unwrap();
@@ -254,6 +255,19 @@ mod tests {
                 s.mapv(|s| s.powi(-2)).sum(),
                 max_relative = 1e-11
             );
+        }
+    }
+
+    #[test]
+    fn products_of_wide_matrices_are_those_of_narrow_ones() {
+        for (rows, columns) in [(3, 241), (50, 250), (7, 601)] {
+            // Small integers, so that nothing rounds.
+            let a = Array2::from_shape_fn((rows, columns), |(i, j)| ((3 * i + 5 * j) % 7) as f64);
+            let (by_rows, by_columns) = (f64::gram(a.view()), f64::gram(a.t().to_owned().t()));
+            assert_eq!(both_halves(&by_rows), a.t().dot(&a));
+            assert_eq!(both_halves(&by_columns), a.t().dot(&a));
+            let single = f32::gram(a.mapv(|v| v as f32).view());
+            assert_eq!(both_halves(&single.mapv(Scalar::as_f64)), a.t().dot(&a));
         }
     }
 

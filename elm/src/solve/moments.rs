@@ -187,6 +187,7 @@ impl<A: Scalar> Moments<A> {
         let mut tile = vec![A::zero(); tile_rows * width];
         let mut shift = vec![A::zero(); neurons + outputs];
         let mut sums = Array2::zeros((width, width).f());
+        let mut scratch = Vec::new();
         if source.intercept && rows > tile_rows {
             // Of rows from everywhere, as the first may be unlike the rest.
             let mut roots = Vec::with_capacity(SAMPLE);
@@ -212,7 +213,7 @@ impl<A: Scalar> Moments<A> {
                 }
             }
             if let Ok(tile) = ArrayView2::from_shape((tile.len() / width, width), tile) {
-                A::add_gram(tile, &mut sums);
+                A::add_gram(tile, &mut sums, &mut scratch);
             }
         }
         Ok(Self::of_sums(&sums, frame, shift))
