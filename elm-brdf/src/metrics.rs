@@ -238,14 +238,10 @@ pub(crate) struct Comparison {
 }
 
 impl Comparison {
-    pub(crate) fn is_empty(&self) -> bool {
-        self.truth.is_empty()
-    }
-
     /// Adds what another says of these of its places.
-    pub(crate) fn extend(&mut self, other: &Self, places: impl Iterator<Item = usize> + Clone) {
+    pub(crate) fn extend(&mut self, other: &Self, places: &[usize]) {
         let add = |own: &mut Vec<f64>, other: &[f64]| {
-            own.extend(places.clone().map(|place| other[place]));
+            own.extend(places.iter().map(|&place| other[place]));
         };
         add(&mut self.predicted, &other.predicted);
         add(&mut self.truth, &other.truth);

@@ -1,7 +1,5 @@
 //! k-fold cross-validation of anything that can be fitted to measurements.
 
-use std::iter;
-
 use elm_datasets::{Directions, Material, MaterialId, Measurements, Samples};
 use ndarray::{Array2, ArrayView2, Axis, Slice, concatenate};
 use rand::SeedableRng;
@@ -294,6 +292,8 @@ impl<'a> Group<'a> {
         let held_out = Array2::from_shape_fn(values.dim(), |(row, column)| {
             fits[labels[row]][[row, column]]
         });
+        let rows_of = |fold: usize| (0..rows).partition(|&row| labels[row] == fold);
+        let split: Vec<(Vec<usize>, Vec<usize>)> = (0..folds.count).map(rows_of).collect();
         let cosines: Vec<f64> = pairs.iter().map(|p| p.outgoing[2].max(0.0)).collect();
         let exchanged = quality::exchanged(pairs);
         let scores = values
@@ -302,30 +302,24 @@ impl<'a> Group<'a> {
             .enumerate()
             .map(|(column, values)| {
                 let truth = Truth::new(cosines.clone(), values.to_vec());
-                let fits: Vec<Comparison> = fits
-                    .iter()
-                    .map(|fit| truth.compare(fit.column(column).iter().copied()))
-                    .collect();
                 let mut train = Comparison::default();
                 let mut each_fold = Vec::with_capacity(fits.len());
-                for (fold, fit) in fits.iter().enumerate() {
-                    let trained = (0..rows).filter(|&row| labels[row] != fold);
-                    train.extend(fit, trained);
-                    let mut test = Comparison::default();
-                    test.extend(fit, (0..rows).filter(|&row| labels[row] == fold));
+                for (fit, (test, trained)) in fits.iter().zip(&split) {
+                    let fit = truth.compare(fit.column(column).iter().copied());
+                    train.extend(&fit, trained);
                     // Where invalid values are dropped a fold may hold none of a material's rows.
                     if !test.is_empty() {
-                        each_fold.push(test.metrics()?);
+                        let mut held_out = Comparison::default();
+                        held_out.extend(&fit, test);
+                        each_fold.push(held_out.metrics()?);
                     }
                 }
+                let all = truth.compare(held_out.column(column).iter().copied());
                 let saturated = quality::saturated(pairs, values);
-                let (mut all, mut unsaturated) = (Comparison::default(), Comparison::default());
-                for (row, &label) in labels.iter().enumerate() {
-                    all.extend(&fits[label], iter::once(row));
-                    if saturated.binary_search(&row).is_err() {
-                        unsaturated.extend(&fits[label], iter::once(row));
-                    }
-                }
+                let mut unsaturated = Comparison::default();
+                let is_saturated = |row: &usize| saturated.binary_search(row).is_ok();
+                let left: Vec<usize> = (0..rows).filter(|row| !is_saturated(row)).collect();
+                unsaturated.extend(&all, &left);
                 let all = all.metrics()?;
                 Ok(Scores {
                     train: train.metrics()?,
