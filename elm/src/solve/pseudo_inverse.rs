@@ -76,9 +76,13 @@ impl PseudoInverse {
         if let Some(solution) = self.solve_triangle(&triangle, &prepared.frame) {
             return Ok(solution);
         }
-        let lengths = prepared.frame.lengths(hidden);
-        let spectrum = Spectrum::of_triangle(triangle, lengths, prepared.frame)?;
-        Ok(self.solve_spectrum(&spectrum))
+        let spectrum = if Spectrum::<A>::goes_by_triangle(hidden) {
+            let lengths = prepared.frame.lengths(hidden);
+            Spectrum::of_triangle(triangle, lengths, prepared.frame)
+        } else {
+            Spectrum::from_prepared(prepared)
+        };
+        Ok(self.solve_spectrum(&spectrum?))
     }
 
     pub(super) fn solve_spectrum<A: Scalar>(self, spectrum: &Spectrum<A>) -> Solution<A> {
@@ -106,8 +110,9 @@ impl PseudoInverse {
         triangle: &Triangular<A>,
         frame: &Frame<A>,
     ) -> Option<Solution<A>> {
-        // The extreme singular values are known to a few digits here, and to many elsewhere.
-        const CLEAR: f64 = 2.0;
+        // In a direction that is not there QR can leave several times the level of rounding, which
+        // is what singular values of the matrix itself are off by.
+        const CLEAR: f64 = 100.0;
         let r = triangle.r.view();
         let neurons = r.ncols();
         let inverse = A::solve_upper(r, Array2::eye(neurons).view()).ok()?;
@@ -117,8 +122,9 @@ impl PseudoInverse {
         let norm_of = |gram| largest_eigenvalue(&Symmetric::of_lower(&gram)).map(A::sqrt);
         let largest = norm_of(A::gram(r))?;
         let smallest = norm_of(A::gram(inverse.t()))?.recip();
-        let cutoff = self.effective_cutoff(rounding(frame.rows, neurons));
-        if smallest <= A::from_f64(CLEAR) * cutoff * largest {
+        let level = A::from_f64(CLEAR) * rounding(frame.rows, neurons);
+        let cutoff = A::from_f64(2.0) * self.effective_cutoff(A::zero());
+        if smallest <= level.max(cutoff) * largest {
             return None;
         }
         let beta = frame.restore(A::solve_upper(r, triangle.qtb.view()).ok()?);

@@ -61,8 +61,7 @@ impl<A: Scalar> Spectrum<A> {
             frame,
         } = prepared;
         let lengths = frame.lengths(hidden.view());
-        // Below twice as many rows as columns QR first costs more than it saves.
-        if hidden.nrows() >= 2 * hidden.ncols() {
+        if Self::goes_by_triangle(hidden.view()) {
             let triangle = A::triangularise(hidden.view(), targets.view())?;
             return Self::of_triangle(triangle, lengths, frame);
         }
@@ -82,6 +81,13 @@ impl<A: Scalar> Spectrum<A> {
             lengths,
             frame,
         })
+    }
+
+    /// Whether a matrix is triangularised before its singular values are taken. Below twice as many
+    /// rows as columns that costs more than it saves, and what it leaves in directions that are not
+    /// there is no longer small beside [`rounding`].
+    pub(crate) fn goes_by_triangle(hidden: ArrayView2<'_, A>) -> bool {
+        hidden.nrows() >= 2 * hidden.ncols()
     }
 
     /// From the triangle of a QR factorisation; `lengths` as in [`Frame::lengths`].

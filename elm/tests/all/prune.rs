@@ -1,7 +1,5 @@
 //! Pruned networks: what is kept, by how much it beats chance, and that its error is as stated.
 
-#![allow(clippy::unwrap_used)]
-
 use elm::prune::{Keep, Pruned};
 use elm::solve::{Inverse, PseudoInverse, Ridge};
 use elm::{Activation, Biases, Elm, ElmParams, Error, Neurons, Scaler, metrics};

@@ -1,11 +1,7 @@
 //! Bad or extreme input gives a correct result or a typed error that names the place: never a
 //! panic, a hang or a silent NaN.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests are not seen as tests.
-
-mod common;
-
-use common::{Problem, amplification, frobenius, normal};
+use crate::common::{Problem, amplification, frobenius, normal};
 use elm::solve::{Inverse, LeastSquares, PseudoInverse, Ridge, Solver};
 use elm::{Activation, Biases, Elm, ElmParams, Error, Result, Scalar};
 use ndarray::{Array1, Array2, array, s};

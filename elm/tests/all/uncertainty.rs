@@ -1,7 +1,5 @@
 //! Standard deviations and intervals: against refitting, and by what they cover.
 
-#![allow(clippy::unwrap_used)]
-
 use approx::assert_relative_eq;
 use elm::solve::{Lambda, LeastSquares, PseudoInverse, Ridge, Solver};
 use elm::{Activation, ElmParams, Error};

@@ -1,7 +1,5 @@
 //! Files: round trips, and every way in which one can be wrong.
 
-#![allow(clippy::unwrap_used)]
-
 use elm::persist::{self, Error};
 use elm::solve::Ridge;
 use elm::{Accumulator, Activation, Elm, ElmParams, Kind, Neurons};

@@ -1,7 +1,5 @@
 //! Random problems with known structure, shared by the integration tests.
 
-#![allow(dead_code)] // Each test file uses a part.
-
 use elm::Scalar;
 use elm::solve::{Diagnosis, LeastSquares, Ridge, Solution, Solver};
 use ndarray::{Array1, Array2, Axis, concatenate};

@@ -1,10 +1,6 @@
 //! Rows that arrive in pieces give the answer of a batch fit.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests are not seen as tests.
-
-mod common;
-
-use common::{amplification, frobenius, normal, weights};
+use crate::common::{amplification, frobenius, normal, weights};
 use elm::solve::{Inverse, PseudoInverse, Ridge, Solver};
 use elm::{Accumulator, Biases, CheckedParams, Elm, ElmParams, Error, Scalar, Scaler};
 use ndarray::{Array1, Array2, Axis, array, s};

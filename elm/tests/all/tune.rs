@@ -1,7 +1,5 @@
 //! Tuning: what it chooses is near the best there is, repeats itself, and keeps its budget.
 
-#![allow(clippy::unwrap_used)]
-
 use elm::tune::Criterion;
 use elm::{Activation, ElmParams, Error, metrics};
 use ndarray::{Array1, Array2, Axis, array};

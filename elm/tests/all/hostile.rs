@@ -1,8 +1,6 @@
 //! What somebody who wants to break the library would try: an error that names the place, or an
 //! answer that is right.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests are not seen as tests.
-
 use elm::solve::{PseudoInverse, Ridge, Solver};
 use elm::tune::Criterion;
 use elm::validate::{Validator, assign_folds};

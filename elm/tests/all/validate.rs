@@ -1,10 +1,6 @@
 //! Held-out predictions in closed form are those of refitting.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests are not seen as tests.
-
-mod common;
-
-use common::{Problem, doubled_rows, frobenius, normal, problems, weights};
+use crate::common::{Problem, doubled_rows, frobenius, normal, problems, weights};
 use elm::solve::{Inverse, LeastSquares, PseudoInverse, Ridge, Solver};
 use elm::validate::{Validator, assign_folds};
 use elm::{ElmParams, Error, Scalar, metrics};

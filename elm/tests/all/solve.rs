@@ -5,11 +5,7 @@
 //! dimension times epsilon (Higham, Accuracy and Stability of Numerical Algorithms, 2002, ch. 9
 //! and 19).
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests are not seen as tests.
-
-mod common;
-
-use common::{
+use crate::common::{
     Problem, amplification, deficient, frobenius, integers, largest, normal, problems, weights,
 };
 use elm::solve::{Inverse, LeastSquares, PseudoInverse, Reason, Ridge, Route, Solver};
@@ -85,6 +81,20 @@ fn normal_equations_hold<A: Scalar>(problem: &Problem<A>, solver: Solver) {
         let sums = residual.sum_axis(Axis(0)).insert_axis(Axis(0));
         assert!(largest(&sums) <= bound, "the constant's equation");
     }
+}
+
+/// Seventeen rows of which six count for nothing, and an intercept: rank 10 of 17. A factorisation
+/// by QR leaves 20 epsilon in a direction that is not there.
+#[test]
+fn a_square_matrix_whose_rows_are_absent_in_part_is_not_of_full_rank() {
+    let mut problem = Problem::noisy(normal::<f64>(17, 17, 681), 1, 0.3, 682)
+        .weighted(weights(17, 681))
+        .with_intercept();
+    for row in (1..17).step_by(3) {
+        problem.weights.as_mut().unwrap()[row] = 0.0;
+    }
+    let solution = problem.solve(PseudoInverse::default());
+    assert_eq!(solution.diagnosis.rank, Some(10));
 }
 
 /// Almost singular in single precision: the pseudo-inverse drops a direction, the inverse refuses.

@@ -1,10 +1,9 @@
 //! The example `csv` on tables as users bring them.
 
-#![allow(clippy::unwrap_used, dead_code)]
-
 use std::path::PathBuf;
 
-#[path = "../examples/csv.rs"]
+#[allow(dead_code)] // Its `main`.
+#[path = "../../examples/csv.rs"]
 mod example;
 
 struct Files(tempfile::TempDir);

@@ -1,0 +1,17 @@
+//! What the library promises, through its public interface. One program, as the solvers would be
+//! compiled anew for each.
+
+// Helpers of tests are not seen as tests.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod accumulate;
+mod bad_input;
+mod common;
+mod csv_example;
+mod hostile;
+mod persist;
+mod prune;
+mod solve;
+mod tune;
+mod uncertainty;
+mod validate;
