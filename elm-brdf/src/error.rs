@@ -20,14 +20,6 @@ pub enum Error {
     /// A model's file could not be written or read.
     #[error(transparent)]
     File(#[from] elm::persist::Error),
-    /// A model's file could not be read.
-    #[error("{}: {reason}", path.display())]
-    Contents {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: elm::persist::Error,
-    },
     /// The weights of a network trained elsewhere could not be read.
     #[error("{}: {reason}", path.display())]
     Weights {

@@ -18,19 +18,12 @@ pub(crate) fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
     })
 }
 
-/// Reads a model, or what else was saved, and names the file where it cannot.
+/// Reads a model, or what else was saved.
 ///
 /// # Errors
-/// [`Error::File`] or [`Error::Contents`].
+/// [`Error::File`].
 pub(crate) fn load<T: persist::Persist>(path: &Path) -> Result<T> {
-    persist::load(path).map_err(|error| match error {
-        // It names the file itself.
-        persist::Error::Io { .. } => error.into(),
-        reason => Error::Contents {
-            path: path.to_owned(),
-            reason,
-        },
-    })
+    Ok(persist::load(path)?)
 }
 
 fn put(path: &Path, bytes: &[u8]) -> io::Result<()> {

@@ -236,7 +236,7 @@ impl<A: Scalar> Accumulator<A> {
         t: ArrayView2<'_, A>,
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<()> {
-        check_length("inputs", x.ncols(), self.inputs)?;
+        check_length("columns of inputs", x.ncols(), self.inputs)?;
         check_length("outputs", t.ncols(), self.outputs)?;
         check_length("rows of targets", t.nrows(), x.nrows())?;
         if let Some(weights) = weights {

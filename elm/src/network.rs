@@ -261,7 +261,7 @@ impl<A: Scalar> Elm<A> {
     /// # Errors
     /// [`Error::Shape`], [`Error::Empty`] and [`Error::NotFinite`] for `x`; [`Error::TooLarge`].
     pub fn hidden_matrix(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
-        check_length("inputs", x.ncols(), self.inputs())?;
+        check_length("columns of inputs", x.ncols(), self.inputs())?;
         check_matrix("inputs", x.view())?;
         check_room("the hidden-layer matrix", x.nrows(), self.beta.nrows())?;
         let scaled = self

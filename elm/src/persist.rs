@@ -83,8 +83,16 @@ pub enum Error {
         /// The type asked for.
         expected: &'static str,
     },
+    /// What is wrong with the contents of this file.
+    #[error("{}: {reason}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Any other variant but [`Io`](Self::Io), which names its file itself.
+        reason: Box<Error>,
+    },
     /// It ends too early, or goes on too long.
-    #[error("the file has {found} bytes after byte {at}, expected {expected}")]
+    #[error("{}: {found} bytes after byte {at}, expected {expected}", misfit(*found, *expected))]
     Length {
         /// Where the counting begins.
         at: usize,
@@ -102,7 +110,7 @@ pub enum Error {
         expected: u32,
     },
     /// Its contents make no sense.
-    #[error("the file's contents are not an {kind}: {reason}")]
+    #[error("the file's contents are damaged or not an {kind}: {reason}")]
     Contents {
         /// What was expected.
         kind: &'static str,
@@ -208,7 +216,7 @@ pub fn save<T: Persist>(value: &T, path: impl AsRef<Path>) -> Result<(), Error> 
 /// Reads a file of either form, whatever its name.
 ///
 /// # Errors
-/// Every variant of [`Error`] but [`Error::CustomActivation`].
+/// [`Error::Io`]; [`Error::File`] with the path and what [`from_bytes`] says.
 pub fn load<T: Persist>(path: impl AsRef<Path>) -> Result<T, Error> {
     let path = path.as_ref();
     let mut bytes = Vec::new();
@@ -219,7 +227,10 @@ pub fn load<T: Persist>(path: impl AsRef<Path>) -> Result<T, Error> {
             path: path.to_owned(),
             reason,
         })?;
-    from_bytes(&bytes)
+    from_bytes(&bytes).map_err(|reason| Error::File {
+        path: path.to_owned(),
+        reason: Box::new(reason),
+    })
 }
 
 /// Readable JSON, ending with a line end.
@@ -262,7 +273,7 @@ pub fn to_bytes<T: Persist>(value: &T) -> Result<Vec<u8>, Error> {
 /// Reads what [`to_bytes`] or [`to_json`] wrote.
 ///
 /// # Errors
-/// Every variant of [`Error`] but [`Error::Io`] and [`Error::CustomActivation`].
+/// Every variant of [`Error`] but [`Error::Io`], [`Error::File`] and [`Error::CustomActivation`].
 pub fn from_bytes<T: Persist>(bytes: &[u8]) -> Result<T, Error> {
     match bytes {
         [b'{', ..] => from_json(bytes),
@@ -290,9 +301,11 @@ fn from_json<T: Persist>(text: &[u8]) -> Result<T, Error> {
 
 fn from_binary<T: Persist>(bytes: &[u8]) -> Result<T, Error> {
     let mut reader = Reader { bytes, at: 0 };
-    if reader.take(MAGIC.len()).map_err(|_| Error::Foreign)? != MAGIC {
+    // A file of nothing, or of the beginning, is cut short.
+    if !bytes.starts_with(MAGIC) && !MAGIC.starts_with(bytes) {
         return Err(Error::Foreign);
     }
+    reader.take(MAGIC.len())?;
     let version = u32::from_le_bytes(reader.array()?);
     let mut name = || -> Result<String, Error> {
         let [length] = reader.array()?;
@@ -346,6 +359,14 @@ fn check_head<T: Persist>(version: u32, kind: &str, scalar: &str) -> Result<(), 
         });
     }
     Ok(())
+}
+
+fn misfit(found: u64, expected: u64) -> &'static str {
+    if found < expected {
+        "the file is cut short"
+    } else {
+        "the file goes on after its end"
+    }
 }
 
 fn contents<T: Persist>(reason: impl std::fmt::Display) -> Error {

@@ -151,7 +151,7 @@ impl<A: Scalar> Predictor<A> {
     /// # Errors
     /// Those of [`predict_into`](Self::predict_into); [`Error::TooLarge`].
     pub fn predict(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
-        check_length("inputs", x.ncols(), self.inputs())?;
+        check_length("columns of inputs", x.ncols(), self.inputs())?;
         check_room("the predictions", x.nrows(), self.outputs())?;
         let mut out = Array2::zeros((x.nrows(), self.outputs()));
         self.predict_into(x, &mut out, &mut self.scratch())?;
@@ -221,7 +221,7 @@ impl<A: Scalar> Predictor<A> {
     }
 
     fn check(&self, x: &ArrayRef2<A>, out: &ArrayRef2<A>) -> Result<()> {
-        check_length("inputs", x.ncols(), self.inputs())?;
+        check_length("columns of inputs", x.ncols(), self.inputs())?;
         check_length("rows of predictions", out.nrows(), x.nrows())?;
         check_length("columns of predictions", out.ncols(), self.outputs())
     }

@@ -336,7 +336,7 @@ fn wrong_sizes_and_values_are_named() {
     };
     assert_eq!(
         try_into(&Array2::zeros((4, 2)), &mut out),
-        shape("inputs", 3, 2)
+        shape("columns of inputs", 3, 2)
     );
     assert_eq!(
         try_into(&Array2::zeros((5, 3)), &mut out),

@@ -103,6 +103,16 @@ fn files_are_written_whole_in_the_form_their_name_asks_for() {
 }
 
 #[test]
+fn what_is_wrong_with_a_file_is_said_with_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("short.elm");
+    std::fs::write(&path, b"elmfile").unwrap();
+    let error = persist::load::<Elm<f64>>(&path).unwrap_err().to_string();
+    let expected = "short.elm: the file is cut short: 7 bytes after byte 0, expected 8";
+    assert!(error.ends_with(expected), "{error}");
+}
+
+#[test]
 fn an_accumulator_goes_on_where_its_file_left_off() {
     let (x, t) = data();
     let params = ElmParams::new(8)
@@ -155,7 +165,11 @@ fn each_kind_of_damage_has_its_own_error() {
         bytes[at] = value;
         bytes
     };
-    assert!(matches!(refuse(b""), Error::Foreign));
+    let empty = refuse(b"").to_string();
+    assert_eq!(
+        empty,
+        "the file is cut short: 0 bytes after byte 0, expected 8"
+    );
     assert!(matches!(refuse(b"%PDF-1.7 and so on"), Error::Foreign));
     assert!(matches!(
         refuse(&with(8, 2)),
