@@ -110,7 +110,7 @@ pub enum Error {
         expected: u32,
     },
     /// Its contents make no sense.
-    #[error("the file's contents are damaged or not an {kind}: {reason}")]
+    #[error("the file holds no sound {kind}: {reason}")]
     Contents {
         /// What was expected.
         kind: &'static str,

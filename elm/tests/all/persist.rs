@@ -225,7 +225,7 @@ fn a_file_that_contradicts_itself_is_refused() {
         mutate(&|c| c["direct_links"] = serde_json::json!(true)),
     ] {
         assert!(
-            error.starts_with("the file's contents are not an elm model"),
+            error.starts_with("the file holds no sound elm model"),
             "{error}"
         );
     }
