@@ -242,7 +242,7 @@ fn what_cannot_be_taken_in_is_an_error_and_leaves_no_trace() {
         (accumulator.push(&bad_x, &t), place("inputs", 299, 2)),
         (accumulator.push(&x, &bad_t), place("targets", 0, 1)),
         (accumulator.push(&x, &x), shape("outputs", 2, 3)),
-        (accumulator.push(&t, &t), shape("inputs", 3, 2)),
+        (accumulator.push(&t, &t), shape("columns of inputs", 3, 2)),
         (
             accumulator.push(&x, &t.slice(s![..9, ..])),
             shape("rows of targets", 300, 9),

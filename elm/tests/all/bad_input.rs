@@ -98,7 +98,7 @@ fn shapes_that_do_not_fit_are_named_with_both_sizes() {
     let model = params.fit(&x, &normal(4, 1, 3)).unwrap();
     expect_error(
         model.predict(&normal(5, 3, 4)),
-        &shape("inputs", 2, 3),
+        &shape("columns of inputs", 2, 3),
         "a third input",
     );
     assert_eq!(model.predict(&none(0, 2)).unwrap().dim(), (0, 1));
