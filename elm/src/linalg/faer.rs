@@ -18,8 +18,10 @@ use faer::traits::RealField;
 use faer::{Accum, Conj, MatMut, MatRef, Par};
 use ndarray::{Array1, Array2, ArrayView2, Axis, CowArray, Ix2, ShapeBuilder, s};
 use num_traits::Zero;
+use pulp::{Simd, WithSimd};
 
 use super::{Failure, Kernel, Positive, Svd, Triangular};
+use crate::simd::{Lanes, Level, Real};
 
 const PAR: Par = Par::Seq;
 
@@ -314,40 +316,63 @@ fn solve_positive<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
     Ok(Positive { x, inverse_trace })
 }
 
+/// Passes a result on with the upper halves of vector registers clear.
+///
+/// faer's products can return with them in use, and then every instruction that knows only the
+/// lower halves waits for them: cube roots and logarithms of 20 times the usual time were seen, until
+/// something else cleared them. Vector code that rustc compiles does so when it ends.
+fn clean<T>(result: T) -> T {
+    struct AnyVectorCode<'a>(&'a mut [f64]);
+    impl WithSimd for AnyVectorCode<'_> {
+        type Output = ();
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) {
+            for register in f64::registers_mut::<S>(self.0).0 {
+                let lanes = Lanes::<S, f64>::new(simd, *register);
+                *register = (lanes + lanes).register();
+            }
+        }
+    }
+    let mut values = std::hint::black_box([0.0; 8]);
+    Level::best().run(AnyVectorCode(&mut values));
+    std::hint::black_box(values);
+    result
+}
+
 macro_rules! kernel {
     ($($scalar:ty),*) => {$(
         impl Kernel for $scalar {
             fn product(a: ArrayView2<'_, Self>, b: ArrayView2<'_, Self>) -> Array2<Self> {
-                product(a, b)
+                clean(product(a, b))
             }
 
             fn svd(a: ArrayView2<'_, Self>) -> Result<Svd<Self>, Failure> {
-                decompose(a)
+                clean(decompose(a))
             }
 
             fn singular_values(a: ArrayView2<'_, Self>) -> Result<Array1<Self>, Failure> {
-                singular_values(a)
+                clean(singular_values(a))
             }
 
             fn triangularise(
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
             ) -> Result<Triangular<Self>, Failure> {
-                Ok(triangularise(a, b))
+                Ok(clean(triangularise(a, b)))
             }
 
             fn solve_upper(
                 r: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
             ) -> Result<Array2<Self>, Failure> {
-                solve_upper(r, b)
+                clean(solve_upper(r, b))
             }
 
             fn solve_square(
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
             ) -> Result<Array2<Self>, Failure> {
-                solve_square(a, b)
+                clean(solve_square(a, b))
             }
 
             fn add_gram(
@@ -355,14 +380,14 @@ macro_rules! kernel {
                 sum: &mut Array2<Self>,
                 scratch: &mut Vec<Self>,
             ) {
-                add_gram(a, sum, scratch);
+                clean(add_gram(a, sum, scratch));
             }
 
             fn solve_positive(
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
             ) -> Result<Positive<Self>, Failure> {
-                solve_positive(a, b)
+                clean(solve_positive(a, b))
             }
         }
     )*};
