@@ -146,11 +146,7 @@ impl Metrics {
         if pairs.len() != truth.nrows() {
             return Err(shape("directions", truth.nrows(), pairs.len()));
         }
-        let cosines = pairs.iter().map(|pair| pair.outgoing[2].max(0.0));
-        let cosines: Vec<f64> = cosines
-            .flat_map(|cosine| iter::repeat_n(cosine, truth.ncols()))
-            .collect();
-        let truth = Truth::new(cosines, truth.iter().copied().collect());
+        let truth = Truth::new(pairs, truth);
         truth.compare(predicted.iter().copied()).metrics()
     }
 
@@ -199,12 +195,15 @@ pub(crate) struct Truth {
 }
 
 impl Truth {
-    /// Of as many cosines of the viewing angle as values.
-    pub(crate) fn new(cosines: Vec<f64>, values: Vec<f64>) -> Self {
+    /// Of values of shape (pairs, channels), which are taken row by row.
+    pub(crate) fn new(pairs: &[Pair], values: ArrayView2<'_, f64>) -> Self {
+        let cosines = pairs.iter().map(|pair| pair.outgoing[2].max(0.0));
         Self {
+            cosines: cosines
+                .flat_map(|cosine| iter::repeat_n(cosine, values.ncols()))
+                .collect(),
             cube_roots: values.iter().map(|value| value.cbrt()).collect(),
-            cosines,
-            values,
+            values: values.iter().copied().collect(),
         }
     }
 

@@ -294,14 +294,13 @@ impl<'a> Group<'a> {
         });
         let rows_of = |fold: usize| (0..rows).partition(|&row| labels[row] == fold);
         let split: Vec<(Vec<usize>, Vec<usize>)> = (0..folds.count).map(rows_of).collect();
-        let cosines: Vec<f64> = pairs.iter().map(|p| p.outgoing[2].max(0.0)).collect();
         let exchanged = quality::exchanged(pairs);
         let scores = values
             .columns()
             .into_iter()
             .enumerate()
             .map(|(column, values)| {
-                let truth = Truth::new(cosines.clone(), values.to_vec());
+                let truth = Truth::new(pairs, values.insert_axis(Axis(1)));
                 let mut train = Comparison::default();
                 let mut each_fold = Vec::with_capacity(fits.len());
                 for (fit, (test, trained)) in fits.iter().zip(&split) {

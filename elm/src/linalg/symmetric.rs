@@ -1,16 +1,13 @@
 //! Products of a symmetric matrix with vectors.
 
-use aligned_vec::{AVec, ConstAlign};
 use ndarray::{Array1, Array2, ArrayView2};
 use pulp::{Simd, WithSimd};
 
 use crate::scalar::Scalar;
-use crate::simd::{Lanes, Level};
+use crate::simd::{Aligned, Lanes, Level, zeros};
 
 /// Registers of sums that are taken together.
 const TOGETHER: usize = 4;
-
-type Aligned<A> = AVec<A, ConstAlign<64>>;
 
 /// A symmetric matrix, whole, laid out for products with vectors.
 pub(crate) struct Symmetric<A: Scalar> {
@@ -24,7 +21,7 @@ impl<A: Scalar> Symmetric<A> {
     pub(crate) fn of_lower(lower: &Array2<A>) -> Self {
         let n = lower.nrows();
         let stride = stride::<A>(n);
-        let mut columns = AVec::from_iter(64, std::iter::repeat_n(A::zero(), n * stride));
+        let mut columns = zeros::<A>(n * stride);
         for (j, column) in lower.columns().into_iter().enumerate() {
             for (i, &value) in column.iter().enumerate().skip(j) {
                 columns[j * stride + i] = value;
@@ -51,7 +48,7 @@ impl<A: Scalar> Symmetric<A> {
     /// The product with a vector of as many values. The same bits wherever multiply-add is fused.
     pub(crate) fn product(&self, x: &Array1<A>) -> Array1<A> {
         let stride = stride::<A>(self.n);
-        let mut y: Aligned<A> = AVec::from_iter(64, std::iter::repeat_n(A::zero(), stride));
+        let mut y = zeros::<A>(stride);
         Level::best().run(Product {
             columns: &self.columns,
             x,

@@ -17,10 +17,10 @@ use crate::error::{Error, Result};
 use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
-use crate::simd::Level;
+use crate::simd::{Aligned, Level, zeros};
 use crate::solve::{check_length, check_room};
 use kernels::{Accumulate, Project, row_blocks, sum_of_line};
-use packed::{Aligned, CHUNK_PANELS, Packed, Panels, zeros};
+use packed::{CHUNK_PANELS, Packed, Panels};
 
 pub(crate) use layer::LayerRows;
 

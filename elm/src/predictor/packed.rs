@@ -1,18 +1,11 @@
 //! A network's weights in the order in which evaluation reads them.
 
-use aligned_vec::{AVec, ConstAlign};
 use ndarray::ArrayView2;
 
 use crate::activation::Activation;
 use crate::hidden::{Group, HiddenLayer};
 use crate::scalar::Scalar;
-
-/// Memory that starts at a cache line.
-pub(super) type Aligned<A> = AVec<A, ConstAlign<64>>;
-
-pub(super) fn zeros<A: Scalar>(length: usize) -> Aligned<A> {
-    AVec::from_iter(64, std::iter::repeat_n(A::zero(), length))
-}
+use crate::simd::{Aligned, zeros};
 
 /// Panels in a chunk. A chunk of hidden values for a tile of rows fits the first-level cache.
 pub(super) const CHUNK_PANELS: usize = 16;

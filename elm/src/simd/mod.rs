@@ -16,10 +16,18 @@ mod real;
 
 use std::fmt;
 
+use aligned_vec::{AVec, ConstAlign};
 use pulp::{Arch, Simd, WithSimd};
 
 pub(crate) use lanes::Lanes;
 pub(crate) use real::Real;
+
+/// Memory that starts at a cache line.
+pub(crate) type Aligned<A> = AVec<A, ConstAlign<64>>;
+
+pub(crate) fn zeros<A: Real>(length: usize) -> Aligned<A> {
+    AVec::from_iter(64, std::iter::repeat_n(A::ZERO, length))
+}
 
 /// Which vector unit to use.
 #[derive(Clone, Copy)]
