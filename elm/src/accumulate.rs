@@ -47,9 +47,8 @@ use crate::hidden::HiddenLayer;
 use crate::linalg::Triangular;
 use crate::model::{CheckedParams, Targets};
 use crate::network::{Elm, design};
-use crate::scalar::Scalar;
+use crate::scalar::{Scalar, power_of_two};
 use crate::scaler::Scaler;
-use crate::solve::frame::power_of_two;
 use crate::solve::{Solver, check_length, check_matrix, check_room, check_weights};
 
 /// Rows in, a triangle kept; see the [module](self).

@@ -14,9 +14,8 @@
 use ndarray::{Array1, ArrayRef1, ArrayView1, ArrayView2, Axis};
 
 use crate::error::{Error, Result};
-use crate::scalar::Scalar;
+use crate::scalar::{Scalar, power_of_two};
 use crate::solve::check_length;
-use crate::solve::frame::power_of_two;
 
 /// Root mean squared error.
 ///

@@ -315,14 +315,12 @@ impl Root {
             let gram = Symmetric::of_lower(&f64::gram(hidden.view()));
             largest_eigenvalue(&gram).map(|largest| (relative, largest))
         } else {
-            let spectrum = Spectrum::from_triangle(
-                Prepared {
-                    hidden: hidden.clone(),
-                    targets: targets.clone(),
-                    frame: frame.clone(),
-                },
+            let triangle = Triangular {
+                r: hidden.clone(),
+                qtb: targets.clone(),
                 unreached,
-            )?;
+            };
+            let spectrum = Spectrum::of_triangle(triangle, frame.clone())?;
             let relative = ridge.shared(true).strengths_without_rows(&spectrum);
             let relative = relative.first().copied().unwrap_or(FLOOR);
             spectrum.s.first().map(|s| (relative, s * s))

@@ -4,8 +4,7 @@ use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2, Axis
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::scalar::Scalar;
-use crate::solve::frame::power_of_two;
+use crate::scalar::{Scalar, power_of_two};
 use crate::solve::{check_length, check_matrix};
 
 /// Subtracts each input's mean and divides by its standard deviation (with divisor $n$).

@@ -4,8 +4,9 @@ use ndarray::{Array1, ArrayView1, Axis, s};
 
 use super::Accumulator;
 use crate::error::Result;
-use crate::scalar::Scalar;
-use crate::solve::frame::{Frame, Prepared, power_of_two};
+use crate::linalg::Triangular;
+use crate::scalar::{Scalar, power_of_two};
+use crate::solve::frame::Frame;
 use crate::solve::spectrum::{Spectrum, rounding};
 
 impl<A: Scalar> Accumulator<A> {
@@ -91,13 +92,11 @@ impl<A: Scalar> Accumulator<A> {
             hidden_scale,
             target_scale,
         };
-        Spectrum::from_triangle(
-            Prepared {
-                hidden: h,
-                targets: t,
-                frame,
-            },
-            rest.map_axis(Axis(0), |column| column.dot(&column)),
-        )
+        let triangle = Triangular {
+            r: h,
+            qtb: t,
+            unreached: rest.map_axis(Axis(0), |column| column.dot(&column)),
+        };
+        Spectrum::of_triangle(triangle, frame)
     }
 }

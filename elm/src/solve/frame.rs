@@ -3,7 +3,7 @@
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip};
 
 use super::LeastSquares;
-use crate::scalar::Scalar;
+use crate::scalar::{Scalar, power_of_two};
 
 /// The scales and means that were taken out of a problem.
 #[derive(Debug, Clone)]
@@ -214,37 +214,4 @@ fn centre<A: Scalar>(matrix: &mut Array2<A>, weights: &Array1<A>, total: A) -> A
         }
     }
     mean
-}
-
-/// The power of two at or just below a magnitude (so that dividing by it rounds nothing), or 1
-/// for 0.
-pub(crate) fn power_of_two<A: Scalar>(magnitude: A) -> A {
-    if magnitude == A::zero() {
-        return A::one();
-    }
-    // log2 of a subnormal is fine; 2^1024 is not, hence the bounds of a normal power.
-    let lowest = A::min_positive_value().log2();
-    let exponent = magnitude.log2().floor().max(lowest).min(-lowest);
-    A::from_f64(2.0).powf(exponent)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn powers_of_two_are_exact_over_the_whole_range() {
-        for (magnitude, power) in [
-            (1.0, 1.0),
-            (1.999, 1.0),
-            (2.0, 2.0),
-            (0.75, 0.5),
-            (f64::MAX, 2.0_f64.powi(1022)),
-            (f64::MIN_POSITIVE, f64::MIN_POSITIVE),
-            (5e-324, f64::MIN_POSITIVE),
-            (0.0, 1.0),
-        ] {
-            assert_eq!(power_of_two(magnitude), power, "{magnitude:e}");
-        }
-    }
 }

@@ -143,13 +143,13 @@ impl Tridiagonal {
 mod tests {
     use super::*;
     use crate::linalg::Kernel;
+    use ndarray::{Array2, ShapeBuilder};
+    use ndarray_rand::RandomExt;
+    use ndarray_rand::rand_distr::StandardNormal;
 
     fn largest(lower: &Array2<f64>) -> Option<f64> {
         largest_eigenvalue(&Symmetric::of_lower(lower))
     }
-    use ndarray::{Array2, ShapeBuilder};
-    use ndarray_rand::RandomExt;
-    use ndarray_rand::rand_distr::StandardNormal;
 
     #[test]
     fn the_largest_eigenvalue_is_the_squared_singular_value() {

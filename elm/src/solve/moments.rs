@@ -9,10 +9,10 @@ use std::ops::Range;
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, ShapeBuilder, s};
 
-use super::frame::{Frame, power_of_two, weighted_magnitudes};
+use super::frame::{Frame, weighted_magnitudes};
 use crate::error::Result;
 use crate::predictor::LayerRows;
-use crate::scalar::Scalar;
+use crate::scalar::{Scalar, power_of_two};
 
 /// Where the rows of a hidden-layer matrix come from.
 pub(crate) enum HiddenRows<'a, A: Scalar> {

@@ -77,8 +77,7 @@ impl PseudoInverse {
             return Ok(solution);
         }
         let spectrum = if Spectrum::<A>::goes_by_triangle(hidden) {
-            let lengths = prepared.frame.lengths(hidden);
-            Spectrum::of_triangle(triangle, lengths, prepared.frame)
+            Spectrum::of_triangle(triangle, prepared.frame)
         } else {
             Spectrum::from_prepared(prepared)
         };

@@ -60,27 +60,12 @@ impl<A: Scalar> Spectrum<A> {
             targets,
             frame,
         } = prepared;
-        let lengths = frame.lengths(hidden.view());
         if Self::goes_by_triangle(hidden.view()) {
             let triangle = A::triangularise(hidden.view(), targets.view())?;
-            return Self::of_triangle(triangle, lengths, frame);
+            return Self::of_triangle(triangle, frame);
         }
-        let Svd { u, s, vt } = truncate(A::svd(hidden.view())?, frame.rows);
-        let c = A::product(u.t(), targets.view());
-        let residual = if frame.spanned_by(u.ncols()) {
-            Array2::zeros(targets.dim())
-        } else {
-            targets - A::product(u.view(), c.view())
-        };
-        Ok(Self {
-            route: Route::Svd,
-            s,
-            vt,
-            c,
-            unreached: squares(residual.view()),
-            lengths,
-            frame,
-        })
+        let none = Array1::zeros(targets.ncols());
+        Self::decompose(Route::Svd, hidden.view(), targets, none, frame)
     }
 
     /// Whether a matrix is triangularised before its singular values are taken. Below twice as many
@@ -90,23 +75,31 @@ impl<A: Scalar> Spectrum<A> {
         hidden.nrows() >= 2 * hidden.ncols()
     }
 
-    /// From the triangle of a QR factorisation; `lengths` as in [`Frame::lengths`].
-    pub(crate) fn of_triangle(
-        triangle: Triangular<A>,
-        lengths: Array1<A>,
+    /// For a problem that a QR factorisation has reduced to its triangle.
+    pub(crate) fn of_triangle(triangle: Triangular<A>, frame: Frame<A>) -> Result<Self> {
+        let Triangular { r, qtb, unreached } = triangle;
+        Self::decompose(Route::QrSvd, r.view(), qtb, unreached, frame)
+    }
+
+    /// `unreached` is what of each output's sum of squares is not in `targets`.
+    fn decompose(
+        route: Route,
+        hidden: ArrayView2<'_, A>,
+        targets: Array2<A>,
+        mut unreached: Array1<A>,
         frame: Frame<A>,
     ) -> Result<Self> {
-        let Triangular { r, qtb, unreached } = triangle;
-        let Svd { u, s, vt } = truncate(A::svd(r.view())?, frame.rows);
-        let c = A::product(u.t(), qtb.view());
-        let unreached = if frame.spanned_by(s.len()) {
-            Array1::zeros(unreached.len())
+        let lengths = frame.lengths(hidden);
+        let Svd { u, s, vt } = truncate(A::svd(hidden)?, frame.rows);
+        let c = A::product(u.t(), targets.view());
+        if frame.spanned_by(s.len()) {
+            unreached.fill(A::zero());
         } else {
-            let dropped = squares(qtb.view()) - squares(c.view());
-            unreached + dropped.mapv(|d| d.max(A::zero()))
-        };
+            let residual = targets - A::product(u.view(), c.view());
+            unreached += &squares(residual.view());
+        }
         Ok(Self {
-            route: Route::QrSvd,
+            route,
             s,
             vt,
             c,
@@ -114,19 +107,6 @@ impl<A: Scalar> Spectrum<A> {
             lengths,
             frame,
         })
-    }
-
-    /// For a problem of which a QR factorisation has left the triangle: `unreached` is what of each
-    /// output's sum of squares lay outside it.
-    pub(crate) fn from_triangle(prepared: Prepared<A>, unreached: Array1<A>) -> Result<Self> {
-        let mut spectrum = Self::from_prepared(prepared)?;
-        spectrum.route = Route::QrSvd;
-        if spectrum.frame.spanned_by(spectrum.s.len()) {
-            spectrum.unreached.fill(A::zero());
-        } else {
-            spectrum.unreached += &unreached;
-        }
-        Ok(spectrum)
     }
 
     /// The level of rounding error in singular values, relative to the largest.
