@@ -5,6 +5,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod accumulate;
+mod accumulate_deficient;
 mod bad_input;
 mod common;
 mod csv_example;
