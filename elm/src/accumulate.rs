@@ -42,6 +42,7 @@ mod spectrum;
 use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2, Axis, s};
 use serde::{Deserialize, Serialize};
 
+use crate::bounds::Bounds;
 use crate::error::{Error, Result};
 use crate::hidden::HiddenLayer;
 use crate::linalg::Triangular;
@@ -94,6 +95,9 @@ pub struct Accumulator<A: Scalar> {
     scales: Array1<A>,
     /// Weighted rows that are not in the triangle yet, in the columns of the triangle, unscaled.
     pending: Vec<A>,
+    bounded: bool,
+    /// Of the rows so far whose weight is not 0.
+    bounds: Option<Bounds<A>>,
 }
 
 impl<A: Scalar> Accumulator<A> {
@@ -192,6 +196,8 @@ impl<A: Scalar> Accumulator<A> {
             triangle: Array2::zeros((columns, columns)),
             scales: Array1::ones(columns),
             pending: Vec::new(),
+            bounded: params.is_bounded(),
+            bounds: None,
         })
     }
 
@@ -246,18 +252,33 @@ impl<A: Scalar> Accumulator<A> {
         }
         check_matrix("inputs", x)?;
         check_matrix("targets", t)?;
+        let bounds = Bounds::of(x, t, weights, self.bounded);
         let before = (self.pending.len(), self.rows, self.weighted_rows);
         if self.pending.len() / self.columns() + x.nrows() >= self.block() {
             // The triangle will change: an error after that must leave no trace.
             let mut next = self.clone();
             next.take_in(x, t, weights)?;
             *self = next;
+            self.widen_bounds(bounds);
             return Ok(());
         }
         self.take_in(x, t, weights).inspect_err(|_| {
             self.pending.truncate(before.0);
             (self.rows, self.weighted_rows) = (before.1, before.2);
-        })
+        })?;
+        self.widen_bounds(bounds);
+        Ok(())
+    }
+
+    fn widen_bounds(&mut self, others: Option<Bounds<A>>) {
+        match (&mut self.bounds, others) {
+            (Some(own), Some(others)) => own.widen(&others),
+            (none, others) => {
+                if none.is_none() {
+                    *none = others;
+                }
+            }
+        }
     }
 
     /// Adds checked rows, block by block.
@@ -317,12 +338,14 @@ impl<A: Scalar> Accumulator<A> {
             ("direct links", self.direct_links == other.direct_links),
             ("intercepts", self.intercept == other.intercept),
             ("solvers", self.solver == other.solver),
+            ("bounds of predictions", self.bounded == other.bounded),
         ] {
             if !same {
                 return Err(Error::Mismatch { what });
             }
         }
         let (mut next, mut other) = (self.clone(), other.clone());
+        next.widen_bounds(other.bounds.take());
         next.flush()?;
         other.flush()?;
         next.absorb(&(&other.triangle * &other.scales))?;
@@ -352,6 +375,7 @@ impl<A: Scalar> Accumulator<A> {
             all.hidden,
             all.direct_links,
             solution,
+            all.bounds,
         ))
     }
 

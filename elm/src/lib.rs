@@ -49,6 +49,7 @@
 
 pub mod accumulate;
 pub mod activation;
+pub mod bounds;
 mod error;
 mod hidden;
 mod linalg;
@@ -68,6 +69,7 @@ pub mod validate;
 
 pub use accumulate::Accumulator;
 pub use activation::{Accuracy, Activation};
+pub use bounds::Bounds;
 pub use error::{Error, Result};
 pub use hidden::{Biases, Distribution, Group, HiddenLayer, Kind, Neurons};
 pub use linalg::backend;

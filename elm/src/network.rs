@@ -3,6 +3,7 @@
 use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
+use crate::bounds::Bounds;
 use crate::error::{Error, Result};
 use crate::hidden::HiddenLayer;
 use crate::metrics::root_mean_squares;
@@ -52,6 +53,8 @@ pub struct Elm<A: Scalar> {
     beta: Array2<A>,
     intercept: Array1<A>,
     diagnosis: Diagnosis,
+    /// Of the training rows; nothing for a network of given parts.
+    bounds: Option<Bounds<A>>,
 }
 
 /// An [`Elm`] as it comes from outside, before its parts are known to fit together.
@@ -64,6 +67,7 @@ struct Parts<A: Scalar> {
     beta: Array2<A>,
     intercept: Array1<A>,
     diagnosis: Diagnosis,
+    bounds: Option<Bounds<A>>,
 }
 
 /// Whether a layer and a scaler from outside are finite and fit each other.
@@ -117,6 +121,7 @@ impl<A: Scalar> Elm<A> {
             beta,
             intercept,
             diagnosis,
+            bounds: None,
         })
     }
 }
@@ -132,6 +137,7 @@ impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
             beta,
             intercept,
             mut diagnosis,
+            bounds,
         } = parts;
         check_layer(&hidden, scaler.as_ref())?;
         let (inputs, neurons) = hidden.weights().dim();
@@ -141,6 +147,9 @@ impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
         check_length("intercepts", intercept.len(), beta.ncols())?;
         check_matrix("intercepts", intercept.view().insert_axis(Axis(0)))?;
         diagnosis.check(beta.ncols())?;
+        if let Some(bounds) = &bounds {
+            bounds.check(inputs, beta.ncols())?;
+        }
         Ok(Self {
             scaler,
             hidden,
@@ -148,6 +157,7 @@ impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
             beta,
             intercept,
             diagnosis,
+            bounds,
         })
     }
 }
@@ -158,6 +168,7 @@ impl<A: Scalar> Elm<A> {
         hidden: HiddenLayer<A>,
         direct_links: bool,
         solution: Solution<A>,
+        bounds: Option<Bounds<A>>,
     ) -> Self {
         let Solution {
             beta,
@@ -171,6 +182,7 @@ impl<A: Scalar> Elm<A> {
             beta,
             intercept,
             diagnosis,
+            bounds,
         }
     }
 
@@ -228,6 +240,7 @@ impl<A: Scalar> Elm<A> {
             beta,
             intercept,
             diagnosis,
+            bounds: first.bounds.clone(),
         }
     }
 
@@ -237,7 +250,8 @@ impl<A: Scalar> Elm<A> {
         self.diagnosis.leave_one_out = Some(root_mean_squares(left_out).to_vec());
     }
 
-    /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs).
+    /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs). Outside the
+    /// training rows predictions are held to their [`bounds`](Self::bounds).
     ///
     /// # Errors
     /// [`Error::Shape`] when the number of inputs differs from the training data's,
@@ -255,8 +269,10 @@ impl<A: Scalar> Elm<A> {
     }
 
     /// The hidden-layer matrix of these inputs (the paper's $F$, equation 9): shape (rows, inputs)
-    /// to (rows, neurons), followed by the standardised inputs where they are linked directly.
-    /// Times [`beta`](Self::beta) plus [`intercept`](Self::intercept) it is the prediction.
+    /// to (rows, neurons), followed by the standardised inputs where they are linked directly. Inputs
+    /// have been held to their [`bounds`](Self::bounds).
+    /// Times [`beta`](Self::beta) plus [`intercept`](Self::intercept) it is the prediction, before that
+    /// is held to its own.
     ///
     /// # Errors
     /// [`Error::Shape`], [`Error::Empty`] and [`Error::NotFinite`] for `x`; [`Error::TooLarge`].
@@ -264,12 +280,73 @@ impl<A: Scalar> Elm<A> {
         check_length("columns of inputs", x.ncols(), self.inputs())?;
         check_matrix("inputs", x.view())?;
         check_room("the hidden-layer matrix", x.nrows(), self.beta.nrows())?;
-        let scaled = self
-            .scaler
-            .as_ref()
-            .map(|scaler| scaler.transform(x.view()));
-        let x = scaled.as_ref().map_or(x.view(), |scaled| scaled.view());
-        Ok(design(&self.hidden, self.direct_links, x))
+        Ok(design(
+            &self.hidden,
+            self.direct_links,
+            self.layer_inputs(x).view(),
+        ))
+    }
+
+    /// Inputs as the layer takes them: held to their bounds, and standardised.
+    pub(crate) fn layer_inputs(&self, x: &ArrayRef2<A>) -> Array2<A> {
+        let mut x = x.to_owned();
+        if let Some(bounds) = &self.bounds {
+            bounds.hold_inputs(&mut x);
+        }
+        match &self.scaler {
+            Some(scaler) => scaler.transform(x.view()),
+            None => x,
+        }
+    }
+
+    /// The ranges of the training rows that predictions are held to; nothing for a network
+    /// [of given parts](Self::from_parts).
+    #[must_use]
+    pub fn bounds(&self) -> Option<&Bounds<A>> {
+        self.bounds.as_ref()
+    }
+
+    /// Whether predictions are held to the [`bounds`](Self::bounds) of the training rows, where
+    /// those are known: what [`ElmParams::bounded`](crate::ElmParams::bounded) says when fitting.
+    #[must_use]
+    pub fn bounded(mut self, bounded: bool) -> Self {
+        if let Some(bounds) = &mut self.bounds {
+            bounds.hold(bounded);
+        }
+        self
+    }
+
+    /// How far each row, shape (rows, inputs), lies outside the box that the training rows span: 0
+    /// inside, else the Euclidean distance, each input in units of its standard deviation among
+    /// the training rows (in its own units where inputs are not standardised). An input that was
+    /// constant is ignored, as it is in predictions.
+    ///
+    /// ```
+    /// use elm::ElmParams;
+    /// use ndarray::{Array1, Axis, array};
+    ///
+    /// let x = Array1::linspace(-3.0, 3.0, 60).insert_axis(Axis(1));
+    /// let model = ElmParams::new(20).fit(&x, &x.mapv(f64::sin))?;
+    /// let outside = model.distance_outside(&array![[1.0], [6.0]])?;
+    /// assert!(outside[0] == 0.0 && (outside[1] - 1.7_f64).abs() < 0.1);
+    /// # Ok::<(), elm::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Shape`] and [`Error::NotFinite`] for `x`; [`Error::Conflict`] for a network
+    /// [of given parts](Self::from_parts), which knows no training rows.
+    pub fn distance_outside(&self, x: &ArrayRef2<A>) -> Result<Array1<A>> {
+        let Some(bounds) = &self.bounds else {
+            return Err(Error::Conflict {
+                first: "a network of given parts",
+                second: "a distance from its training rows",
+            });
+        };
+        check_length("columns of inputs", x.ncols(), self.inputs())?;
+        if x.nrows() > 0 {
+            check_matrix("inputs", x.view())?;
+        }
+        Ok(bounds.distance(x, self.scaler.as_ref()))
     }
 
     /// Number of inputs.

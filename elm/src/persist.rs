@@ -37,8 +37,8 @@ use crate::hidden::{Group, HiddenLayer};
 use crate::network::Elm;
 use crate::scalar::Scalar;
 
-/// The version of the layout that this build writes, and the latest that it reads.
-pub const VERSION: u32 = 1;
+/// The version of the layout that this build writes and reads.
+pub const VERSION: u32 = 2;
 
 const MAGIC: &[u8; 8] = b"elmfile\n";
 
@@ -65,6 +65,16 @@ pub enum Error {
         /// The file's version.
         found: u32,
         /// The latest version that is understood.
+        supported: u32,
+    },
+    /// It is from an earlier version of this crate, whose layout is no longer read.
+    #[error(
+        "the file has version {found} of the layout, which this build no longer reads; it reads version {supported}: fit and save again"
+    )]
+    Past {
+        /// The file's version.
+        found: u32,
+        /// The version that is understood.
         supported: u32,
     },
     /// It holds something else.
@@ -342,6 +352,12 @@ fn from_binary<T: Persist>(bytes: &[u8]) -> Result<T, Error> {
 fn check_head<T: Persist>(version: u32, kind: &str, scalar: &str) -> Result<(), Error> {
     if version > VERSION {
         return Err(Error::Future {
+            found: version,
+            supported: VERSION,
+        });
+    }
+    if version < VERSION {
+        return Err(Error::Past {
             found: version,
             supported: VERSION,
         });

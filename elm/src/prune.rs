@@ -59,6 +59,7 @@
 use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis, concatenate, s};
 use serde::{Deserialize, Serialize};
 
+use crate::bounds::Bounds;
 use crate::error::{Error, Result};
 use crate::linalg::{Kernel, Symmetric, Triangular};
 use crate::model::{CheckedParams, Drawn, ElmParams, Targets};
@@ -185,6 +186,7 @@ impl<A: Scalar> CheckedParams<A> {
                 hidden.select(&kept),
                 self.links_directly(),
                 solution,
+                Bounds::of(x.view(), t, weights, self.is_bounded()),
             ),
             kept,
             path,

@@ -198,7 +198,8 @@ impl BrdfParams {
         let x = self.features.compute(pairs);
         let link = self.link.fit(values)?;
         let t = link.to_targets(values)?;
-        let network = self.network.fit(&x, &t)?;
+        // Directions are bounded by themselves, and measurements end short of the horizon.
+        let network = self.network.clone().bounded(false).fit(&x, &t)?;
         let layer = Layer::of(&self.network, network.hidden());
         Ok(BrdfModel::new(self.features, link, layer, network))
     }

@@ -47,14 +47,18 @@ impl Fit for ScaledOnce {
         done: &mut dyn FnMut(usize),
     ) -> Result<Vec<Array2<f64>>> {
         let x = self.0.features.compute(pairs);
-        let network = self.0.network.clone().check()?;
+        let network = self.0.network.clone().bounded(false).check()?;
         let fits = network.cross_fits(&x, &values, folds)?;
         let mut all = Vec::with_capacity(count);
         for fold in 0..count {
             all.push(match fits.iter().find(|fit| fit.label() == fold) {
                 Some(fit) => fit.predictions().to_owned(),
                 // A fold without rows leaves nothing out.
-                None => network.fit(&x, &values)?.predict(&x)?,
+                None => network
+                    .clone()
+                    .bounded(false)
+                    .fit(&x, &values)?
+                    .predict(&x)?,
             });
         }
         done(count);

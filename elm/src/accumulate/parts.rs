@@ -4,6 +4,7 @@ use ndarray::{Array1, Array2};
 use serde::Deserialize;
 
 use super::{Accumulator, BLOCK, OVERFLOW};
+use crate::bounds::Bounds;
 use crate::error::{Error, Result};
 use crate::hidden::HiddenLayer;
 use crate::network::check_layer;
@@ -27,6 +28,8 @@ pub(super) struct Parts<A: Scalar> {
     triangle: Array2<A>,
     scales: Array1<A>,
     pending: Vec<A>,
+    bounded: bool,
+    bounds: Option<Bounds<A>>,
 }
 
 impl<A: Scalar> TryFrom<Parts<A>> for Accumulator<A> {
@@ -36,6 +39,9 @@ impl<A: Scalar> TryFrom<Parts<A>> for Accumulator<A> {
         check_layer(&parts.hidden, parts.scaler.as_ref())?;
         check_length("inputs", parts.inputs, parts.hidden.inputs())?;
         parts.solver.check()?;
+        if let Some(bounds) = &parts.bounds {
+            bounds.check(parts.inputs, parts.outputs)?;
+        }
         check_matrix("triangle", parts.triangle.view())?;
         let links = if parts.direct_links { parts.inputs } else { 0 };
         let own = usize::from(parts.intercept) + parts.hidden.neurons() + links;
@@ -76,6 +82,8 @@ impl<A: Scalar> TryFrom<Parts<A>> for Accumulator<A> {
             triangle,
             scales,
             pending,
+            bounded,
+            bounds,
         } = parts;
         Ok(Self {
             scaler,
@@ -90,6 +98,8 @@ impl<A: Scalar> TryFrom<Parts<A>> for Accumulator<A> {
             triangle,
             scales,
             pending,
+            bounded,
+            bounds,
         })
     }
 }

@@ -3,6 +3,7 @@
 use ndarray::{Array2, ArrayRef2, ArrayView1, ArrayView2};
 
 use super::{ElmParams, Targets};
+use crate::bounds::Bounds;
 use crate::error::{Error, Result};
 use crate::hidden::{HiddenLayer, Neurons};
 use crate::network::{Elm, design};
@@ -134,7 +135,8 @@ impl<A: Scalar> CheckedParams<A> {
                 self.0.solver.solve(&problem)?
             }
         };
-        Ok(Elm::assemble(scaler, hidden, links, solution))
+        let bounds = Bounds::of(x, t, weights, self.0.bounded);
+        Ok(Elm::assemble(scaler, hidden, links, solution, bounds))
     }
 
     /// The random layer alone, for this many inputs: what a [`fit`](Self::fit) draws. Whoever keeps
@@ -160,7 +162,8 @@ impl<A: Scalar> CheckedParams<A> {
     /// has one label per row, and rows of one label are predicted by the fit to all others.
     ///
     /// Ridge has the same strength in every fold, given or chosen on all rows, and inputs are
-    /// standardised on all rows; [`validate`](crate::validate) says what that leaks.
+    /// standardised on all rows; [`validate`](crate::validate) says what that leaks. Predictions are
+    /// not held to the [`bounds`](crate::bounds) of the other rows.
     ///
     /// # Errors
     /// Those of [`fit`](Self::fit) for the data and of [`Validator::k_fold`];
@@ -308,6 +311,10 @@ impl<A: Scalar> CheckedParams<A> {
 
     pub(crate) fn standardises(&self) -> bool {
         self.0.standardise
+    }
+
+    pub(crate) fn is_bounded(&self) -> bool {
+        self.0.bounded
     }
 
     pub(crate) fn links_directly(&self) -> bool {

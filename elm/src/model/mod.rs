@@ -34,6 +34,7 @@ pub(crate) use checked::Drawn;
 /// | [`intercept`](Self::intercept) | on, but off for `Inverse` | an unpenalised constant per output | |
 /// | [`standardise`](Self::standardise) | on | inputs to mean 0, deviation 1 over the training rows | |
 /// | [`direct_links`](Self::direct_links) | off | inputs also reach the outputs directly (RVFL) | |
+/// | [`bounded`](Self::bounded) | on | holds predictions outside the data to its [bounds](crate::bounds) | |
 ///
 /// # Example
 ///
@@ -63,6 +64,7 @@ pub struct ElmParams<A: Scalar> {
     intercept: Option<bool>,
     standardise: bool,
     direct_links: bool,
+    bounded: bool,
 }
 
 impl<A: Scalar> ElmParams<A> {
@@ -80,6 +82,7 @@ impl<A: Scalar> ElmParams<A> {
             intercept: None,
             standardise: true,
             direct_links: false,
+            bounded: true,
         }
     }
 
@@ -207,6 +210,16 @@ impl<A: Scalar> ElmParams<A> {
     #[must_use]
     pub fn direct_links(mut self, direct_links: bool) -> Self {
         self.direct_links = direct_links;
+        self
+    }
+
+    /// Whether inputs beyond those of the training rows are held at the edge of their range, and
+    /// predictions within the range of the training targets and a margin; see
+    /// [`bounds`](crate::bounds). Off, a prediction outside the data is whatever the sum of the
+    /// neurons comes to there.
+    #[must_use]
+    pub fn bounded(mut self, bounded: bool) -> Self {
+        self.bounded = bounded;
         self
     }
 

@@ -37,6 +37,8 @@ impl<'a, A: Scalar> LayerRows<'a, A> {
             packed: Packed::new(hidden, no_outputs.view()),
             scaler: scaler.cloned(),
             intercept: Vec::new(),
+            input_bounds: Vec::new(),
+            output_bounds: Vec::new(),
             accuracy: Accuracy::Full,
             level: Level::best(),
         };

@@ -59,6 +59,9 @@ pub struct Predictor<A: Scalar> {
     packed: Packed<A>,
     scaler: Option<Scaler<A>>,
     intercept: Vec<A>,
+    /// What each input is held between, and each output; empty where they are not.
+    input_bounds: Vec<(A, A)>,
+    output_bounds: Vec<(A, A)>,
     accuracy: Accuracy,
     level: Level,
 }
@@ -80,10 +83,21 @@ pub struct Scratch<A: Scalar> {
 
 impl<A: Scalar> Predictor<A> {
     pub(crate) fn new(model: &Elm<A>) -> Self {
+        let held = model.bounds().filter(|bounds| bounds.are_held());
+        let inputs = held.map(|bounds| {
+            let (lower, upper) = bounds.inputs();
+            lower.into_iter().copied().zip(upper.into_iter().copied())
+        });
+        let outputs = held.map(|bounds| {
+            let (least, greatest) = bounds.predictions();
+            least.into_iter().zip(greatest)
+        });
         Self {
             packed: Packed::new(model.hidden(), model.beta()),
             scaler: model.scaler().cloned(),
             intercept: model.intercept().to_vec(),
+            input_bounds: inputs.into_iter().flatten().collect(),
+            output_bounds: outputs.into_iter().flatten().collect(),
             accuracy: Accuracy::Full,
             level: Level::best(),
         }
@@ -312,6 +326,14 @@ impl<A: Scalar> Predictor<A> {
                 *out = sum_of_line(line) + intercept;
                 finite &= out.is_finite();
             }
+            for (out, &(least, greatest)) in out.iter_mut().zip(&self.output_bounds) {
+                // Written so that NaN stays.
+                if *out > greatest {
+                    *out = greatest;
+                } else if *out < least {
+                    *out = least;
+                }
+            }
         }
         if finite {
             Ok(())
@@ -335,6 +357,9 @@ impl<A: Scalar> Predictor<A> {
                     finite &= value.is_finite();
                     *to = value;
                 }
+            }
+            for (column, &(lower, upper)) in block.chunks_exact_mut(rows).zip(&self.input_bounds) {
+                column.iter_mut().for_each(|x| *x = x.max(lower).min(upper));
             }
             if let Some(scaler) = &self.scaler {
                 scaler.transform_columns(block.chunks_exact_mut(rows));

@@ -90,15 +90,15 @@ fn more_neurons_than_two_inputs_need_are_accumulated_as_well_as_they_are_fitted(
     assert_reported_residual_is_true(&model, &x, &t);
 }
 
-/// `points` different rows in three dimensions, each several times with targets of its own: the
+/// `points` different rows in three dimensions, each several times with noise of its own: the
 /// hidden matrix has exactly that rank, or one less for the intercept.
 fn repeated<A: Scalar>(points: usize, rows: usize, seed: u64) -> (Array2<A>, Array2<A>) {
     let places = normal::<A>(points, 3, seed);
     let order: Vec<usize> = (0..rows).map(|row| row * 7919 % points).collect();
-    (
-        places.select(Axis(0), &order),
-        normal::<A>(rows, 2, seed + 1),
-    )
+    let x = places.select(Axis(0), &order);
+    let noise = normal::<A>(rows, 2, seed + 1).mapv(|v| v * A::from_f64(0.3));
+    let t = x.slice(s![.., ..2]).mapv(A::sin) + noise;
+    (x, t)
 }
 
 /// For each row the mean target of the rows with the same inputs.

@@ -7,6 +7,7 @@
 mod accumulate;
 mod accumulate_deficient;
 mod bad_input;
+mod bounds;
 mod common;
 mod csv_example;
 mod hostile;

@@ -326,7 +326,7 @@ fn a_network_is_cross_validated_as_if_refitted_fold_by_fold() {
             let (kept, out) = (pick(false), pick(true));
             let (x_kept, t_kept) = (x.select(Axis(0), &kept), t.select(Axis(0), &kept));
             let fit = |lambda| {
-                let params = ElmParams::new(20).standardise(false);
+                let params = ElmParams::new(20).standardise(false).bounded(false);
                 params
                     .solver(Ridge::relative(lambda))
                     .fit(&x_kept, &t_kept)

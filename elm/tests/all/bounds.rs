@@ -1,0 +1,195 @@
+//! Predictions outside the training rows.
+
+use crate::common::normal;
+use elm::bounds::MARGIN;
+use elm::solve::Ridge;
+use elm::{Accumulator, Elm, ElmParams, Error, Scalar, metrics, persist, prune::Keep};
+use ndarray::{Array1, Array2, Axis, array, s};
+use ndarray_rand::RandomExt;
+use ndarray_rand::rand_distr::Uniform;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// Uniform inputs in [-1, 1].
+fn cube(rows: usize, inputs: usize, seed: u64) -> Array2<f64> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    Array2::random_using((rows, inputs), Uniform::new(-1.0, 1.0).unwrap(), &mut rng)
+}
+
+fn wave(x: &Array2<f64>) -> Array1<f64> {
+    x.column(0).mapv(|x| (3.0 * x).sin())
+}
+
+fn noisy_wave(rows: usize, seed: u64) -> (Array2<f64>, Array1<f64>) {
+    let x = cube(rows, 3, seed);
+    let noise = normal::<f64>(rows, 1, seed + 1).remove_axis(Axis(1));
+    let t = wave(&x) + noise.mapv(|v| 0.1 * v);
+    (x, t)
+}
+
+/// The range that predictions may have by the documentation.
+fn allowed(t: &Array1<f64>) -> (f64, f64) {
+    let (least, greatest) = t
+        .iter()
+        .fold((f64::MAX, f64::MIN), |(a, b), &v| (a.min(v), b.max(v)));
+    let margin = MARGIN * (greatest - least);
+    (least - margin - 1e-12, greatest + margin + 1e-12)
+}
+
+#[test]
+fn a_default_model_does_not_explode_outside_the_data() {
+    let (x, t) = noisy_wave(300, 1);
+    let test = cube(2000, 3, 9);
+    let (least, greatest) = allowed(&t);
+    for model in [
+        ElmParams::auto().fit(&x, &t).unwrap(),
+        ElmParams::new(100).fit(&x, &t).unwrap(),
+    ] {
+        for stretch in [1.0, 1.2, 2.0, 3.0, 50.0, 1e300] {
+            let y = model.predict(&test.mapv(|x| x * stretch)).unwrap();
+            assert!(y.iter().all(|y| (least..=greatest).contains(y)));
+        }
+        // Of a function within 1 and noise of 0.1.
+        for stretch in [1.2, 1.5] {
+            let stretched = test.mapv(|x| x * stretch);
+            let y = model.predict(&stretched).unwrap();
+            let error = metrics::rmse(&y.column(0), &wave(&stretched)).unwrap();
+            assert!(error < 0.7, "{stretch}: {error}");
+        }
+    }
+}
+
+#[test]
+fn inside_the_data_the_bound_changes_nothing() {
+    let (x, t) = noisy_wave(100, 3);
+    let held = ElmParams::new(30).fit(&x, &t).unwrap();
+    let free = ElmParams::new(30).bounded(false).fit(&x, &t).unwrap();
+    assert_eq!(held.predict(&x).unwrap(), free.predict(&x).unwrap());
+    assert_eq!(
+        held.hidden_matrix(&x).unwrap(),
+        free.hidden_matrix(&x).unwrap()
+    );
+    assert_eq!(held.diagnosis(), free.diagnosis());
+}
+
+#[test]
+fn beyond_an_edge_a_prediction_is_that_at_the_edge() {
+    let x = array![[0.0, 5.0], [1.0, 6.0], [2.0, 9.0], [3.0, 7.0], [1.5, 8.0]];
+    let t = array![[0.0, 1.0], [1.0, 4.0], [0.5, 2.0], [2.0, 2.0], [1.0, 0.0]];
+    let model = ElmParams::new(12).fit(&x, &t).unwrap();
+    let outside = array![[-7.0, 6.0], [1.0, 1e9], [4.0, -1e9]];
+    let edge = array![[0.0, 6.0], [1.0, 9.0], [3.0, 5.0]];
+    let at_edge = model.predict(&edge).unwrap();
+    assert_eq!(model.predict(&outside).unwrap(), at_edge);
+    let predictor = model.predictor();
+    for (row, expected) in outside.rows().into_iter().zip(at_edge.rows()) {
+        let mut y = [0.0; 2];
+        let row = row.to_vec();
+        let scratch = &mut predictor.scratch();
+        predictor.predict_row(&row, &mut y, scratch).unwrap();
+        assert_eq!(expected.to_vec(), y);
+    }
+    // Switched off after the fit it is the sum of the neurons.
+    let free = model.clone().bounded(false);
+    let by_hand = free.hidden_matrix(&outside).unwrap().dot(&free.beta()) + free.intercept();
+    approx::assert_relative_eq!(
+        free.predict(&outside).unwrap(),
+        by_hand,
+        max_relative = 1e-10
+    );
+    assert_eq!(
+        free.bounded(true).predict(&outside).unwrap(),
+        model.predict(&outside).unwrap()
+    );
+}
+
+#[test]
+fn the_distance_from_the_data_is_told_in_standard_deviations() {
+    let x = array![[0.0, 5.0, 1.0], [2.0, 7.0, 1.0]];
+    let model = ElmParams::new(4).fit(&x, &array![0.0, 1.0]).unwrap();
+    // Deviations are 1, 1, and none.
+    let rows = array![[1.0, 6.0, 1.0], [5.0, 6.0, 1.0], [-3.0, 11.0, 7.0]];
+    let distance = model.distance_outside(&rows).unwrap();
+    approx::assert_relative_eq!(distance, array![0.0, 3.0, 5.0], max_relative = 1e-14);
+    let given = Elm::from_parts(
+        model.scaler().cloned(),
+        model.hidden().clone(),
+        model.beta().to_owned(),
+        model.intercept().to_owned(),
+    );
+    assert!(matches!(
+        given.unwrap().distance_outside(&rows),
+        Err(Error::Conflict { .. })
+    ));
+    assert_eq!(
+        model
+            .distance_outside(&rows.slice(s![..0, ..]))
+            .unwrap()
+            .len(),
+        0
+    );
+}
+
+fn bounds_travel<A: Scalar>() {
+    let x = normal::<A>(60, 2, 5);
+    let t = x.map_axis(Axis(1), |row| row[0] * row[1]);
+    let params = ElmParams::new(15).solver(Ridge::gcv());
+    let model = params.fit(&x, &t).unwrap();
+    let far = normal::<A>(40, 2, 6).mapv(|v| v * A::from_f64(30.0));
+    let expected = model.predict(&far).unwrap();
+    for again in [
+        persist::from_bytes::<Elm<A>>(&persist::to_bytes(&model).unwrap()).unwrap(),
+        persist::from_bytes(persist::to_json(&model).unwrap().as_bytes()).unwrap(),
+    ] {
+        assert_eq!(again.predict(&far).unwrap(), expected);
+    }
+    let checked = params.clone().check().unwrap();
+    let mut one = Accumulator::from_sample(&checked, &x, 1).unwrap();
+    let mut other = one.clone();
+    one.push(&x.slice(s![..20, ..]), &t.slice(s![..20]))
+        .unwrap();
+    other
+        .push(&x.slice(s![20.., ..]), &t.slice(s![20..]))
+        .unwrap();
+    one.merge(&other).unwrap();
+    let one = persist::from_bytes::<Accumulator<A>>(&persist::to_bytes(&one).unwrap()).unwrap();
+    assert_eq!(one.fit().unwrap().bounds(), model.bounds());
+    let pruned = checked.fit_pruned(&x, &t, Keep::Neurons(5)).unwrap();
+    assert_eq!(pruned.model.bounds(), model.bounds());
+    let mean = params.fit_ensemble(2, &x, &t).unwrap();
+    assert_eq!(mean.model().bounds(), model.bounds());
+}
+
+#[test]
+fn bounds_are_part_of_files_accumulators_pruned_networks_and_ensembles() {
+    bounds_travel::<f64>();
+    bounds_travel::<f32>();
+}
+
+#[test]
+fn a_skewed_input_just_beyond_its_largest_value_is_predicted_sanely() {
+    // Incomes: x = exp(6.8 + 0.45 z), t = 80 + x / 2 + noise in proportion to x.
+    for draw in 0..40 {
+        let z = normal::<f64>(176, 2, 100 + draw);
+        let x = z.column(0).mapv(|z| (6.8 + 0.45 * z).exp());
+        let t = Array1::from_iter(
+            x.iter()
+                .zip(z.column(1))
+                .map(|(x, z)| 80.0 + x / 2.0 + 0.06 * x * z),
+        );
+        let largest = x.fold(0.0, |m: f64, x| m.max(*x));
+        let x = x.insert_axis(Axis(1));
+        let beyond = array![[1.05 * largest]];
+        let truth = 80.0 + beyond[[0, 0]] / 2.0;
+        for model in [
+            ElmParams::auto().fit(&x, &t).unwrap(),
+            ElmParams::new(100).fit(&x, &t).unwrap(),
+        ] {
+            let y = model.predict(&beyond).unwrap()[[0, 0]];
+            assert!(
+                (y - truth).abs() < 0.5 * truth,
+                "draw {draw}: {y} for {truth}"
+            );
+        }
+    }
+}
