@@ -54,11 +54,7 @@ impl Fit for ScaledOnce {
             all.push(match fits.iter().find(|fit| fit.label() == fold) {
                 Some(fit) => fit.predictions().to_owned(),
                 // A fold without rows leaves nothing out.
-                None => network
-                    .clone()
-                    .bounded(false)
-                    .fit(&x, &values)?
-                    .predict(&x)?,
+                None => network.fit(&x, &values)?.predict(&x)?,
             });
         }
         done(count);
