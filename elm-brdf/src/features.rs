@@ -149,6 +149,25 @@ impl Features {
         }
         out
     }
+
+    /// The same for pairs that a model is to be fitted to. An input that varies by no more than the
+    /// rounding of its formula, as where all directions lie at one angle, is made equal in all of
+    /// them: what is standardised by its deviation would take the rounding for a feature.
+    #[must_use]
+    pub fn compute_training(self, pairs: &[Pair]) -> Array2<f64> {
+        // Inputs are of order one.
+        const ROUNDING: f64 = 1e-12;
+        let mut x = self.compute(pairs);
+        for mut column in x.columns_mut() {
+            let Some(&first) = column.first() else {
+                continue;
+            };
+            if column.iter().all(|value| (value - first).abs() <= ROUNDING) {
+                column.fill(first);
+            }
+        }
+        x
+    }
 }
 
 fn paper(pair: &Pair) -> [f64; 6] {
@@ -295,6 +314,21 @@ mod tests {
                     assert!(x.iter().all(|v| v.is_finite()), "{set} {pair:?}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn an_angle_common_to_all_directions_is_a_constant_input() {
+        // Light and viewer turned together: every input is constant, to rounding.
+        let pairs: Vec<Pair> = (0..50)
+            .map(|turn| Pair {
+                incident: cartesian(FRAC_PI_6, 0.1 * f64::from(turn)),
+                outgoing: cartesian(FRAC_PI_3, 0.1 * f64::from(turn) + 1.0),
+            })
+            .collect();
+        for set in Features::ALL {
+            let scaler = elm::Scaler::measured(&set.compute_training(&pairs)).unwrap();
+            assert!(scaler.factor().iter().all(|f| *f == 0.0), "{set}");
         }
     }
 

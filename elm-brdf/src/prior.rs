@@ -134,7 +134,7 @@ impl PriorParams {
                 found: values.ncols(),
             }));
         }
-        let x = self.features.compute(pairs);
+        let x = self.features.compute_training(pairs);
         let scaler = Scaler::measured(&x)?;
         let params = self.params(x.ncols());
         let hidden = params.clone().check()?.hidden_layer(x.ncols())?;

@@ -36,7 +36,9 @@
 //! triangle of the centred problem, and the intercept is as unpenalised as in a batch fit.
 
 mod chunks;
+mod likeness;
 mod parts;
+mod shift;
 mod spectrum;
 
 use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2, Axis, s};
@@ -89,10 +91,16 @@ pub struct Accumulator<A: Scalar> {
     rows: u64,
     /// Rows whose weight is not 0.
     weighted_rows: u64,
+    /// Of these, for each input, those that are far from the scaler's mean.
+    far: Vec<u64>,
+    /// Whether rows may be unlike those that the scaler was measured on.
+    unlike_rows: bool,
     /// The upper triangle, square; columns are the ones (with an intercept), neurons, outputs.
     triangle: Array2<A>,
     /// Powers of two that the triangle's columns were divided by.
     scales: Array1<A>,
+    /// What was taken off the columns after the ones; none before there are rows.
+    shift: Option<Array1<A>>,
     /// Weighted rows that are not in the triangle yet, in the columns of the triangle, unscaled.
     pending: Vec<A>,
     bounded: bool,
@@ -113,12 +121,6 @@ impl<A: Scalar> Accumulator<A> {
         scaler: Scaler<A>,
         outputs: usize,
     ) -> Result<Self> {
-        if !params.standardises() {
-            return Err(Error::Conflict {
-                first: "standardise(false)",
-                second: "a scaler",
-            });
-        }
         if params.needs_rows() {
             return Err(Error::Conflict {
                 first: "biases or centres on the data",
@@ -126,12 +128,31 @@ impl<A: Scalar> Accumulator<A> {
             });
         }
         let none = Array2::zeros((0, scaler.mean().len()));
-        Self::new(params, Some(scaler), none.view(), outputs)
+        Self::from_scaled_sample(params, scaler, &none, outputs)
+    }
+
+    /// As [`from_sample`](Self::from_sample), with a scaler that is known beforehand.
+    fn from_scaled_sample(
+        params: &CheckedParams<A>,
+        scaler: Scaler<A>,
+        x: &ArrayRef2<A>,
+        outputs: usize,
+    ) -> Result<Self> {
+        if !params.standardises() {
+            return Err(Error::Conflict {
+                first: "standardise(false)",
+                second: "a scaler",
+            });
+        }
+        check_length("columns of inputs", x.ncols(), scaler.mean().len())?;
+        let x = scaler.transform(x.view());
+        Self::new(params, Some(scaler), x.view(), outputs)
     }
 
     /// Draws the random layer for rows like those of `x`, shape (rows, inputs): inputs are
     /// standardised by their means and deviations, and biases laid on them, where the parameters
-    /// say so. The rows are not pushed. One sample gives accumulators that can be merged.
+    /// say so. The rows are not pushed. One sample gives accumulators that can be merged. Rows unlike
+    /// the sample are refused; see [`push`](Self::push).
     ///
     /// # Errors
     /// [`Error::Empty`] and [`Error::NotFinite`] for `x`, and those of
@@ -142,7 +163,9 @@ impl<A: Scalar> Accumulator<A> {
         outputs: usize,
     ) -> Result<Self> {
         check_matrix("inputs", x.view())?;
-        let scaler = params.standardises().then(|| Scaler::measure(x.view()));
+        let scaler = params
+            .standardises()
+            .then(|| Scaler::measure(x.view(), None));
         let scaled = scaler.as_ref().map(|scaler| scaler.transform(x.view()));
         let x = scaled.as_ref().map_or(x.view(), |scaled| scaled.view());
         Self::new(params, scaler, x, outputs)
@@ -168,7 +191,7 @@ impl<A: Scalar> Accumulator<A> {
                 second: "an accumulator",
             });
         }
-        let hidden = params.layer(sample)?;
+        let hidden = params.layer(sample, None)?;
         let inputs = hidden.inputs();
         let direct_links = params.links_directly();
         let links = if direct_links { inputs } else { 0 };
@@ -193,8 +216,11 @@ impl<A: Scalar> Accumulator<A> {
             outputs,
             rows: 0,
             weighted_rows: 0,
+            far: vec![0; inputs],
+            unlike_rows: false,
             triangle: Array2::zeros((columns, columns)),
             scales: Array1::ones(columns),
+            shift: None,
             pending: Vec::new(),
             bounded: params.is_bounded(),
             bounds: None,
@@ -211,12 +237,26 @@ impl<A: Scalar> Accumulator<A> {
         self.rows
     }
 
+    /// Whether rows may be unlike those that the scaler was measured on; they may not unless this is
+    /// set, and [`push`](Self::push) says so.
+    #[must_use]
+    pub fn unlike_rows(mut self, allowed: bool) -> Self {
+        self.unlike_rows = allowed;
+        self
+    }
+
     /// Takes in rows: `x` has shape (rows, inputs), `t` (rows, outputs), or (rows) for one output.
     /// No rows is fine.
     ///
     /// # Errors
     /// [`Error::Shape`] and [`Error::NotFinite`] for the data, [`Error::Overflow`] for values
-    /// beyond the range once weighted. After an error nothing has been taken in.
+    /// beyond the range once weighted. Where the scaler does not suit the rows, which no later rows
+    /// mend: [`Error::ConstantInput`] for an input that was constant where the scaler was measured
+    /// and is not here, [`Error::UnlikeRows`] for one that lies more than 10 of the scaler's
+    /// deviations from its mean in more than a hundredth of the rows so far and ten more (by
+    /// Chebyshev's inequality no rows of that mean and deviation do). Begin again with a scaler of a
+    /// [`ScalerBuilder`](crate::ScalerBuilder) that has seen more rows, or
+    /// [allow it](Self::unlike_rows). After an error nothing has been taken in.
     pub fn push<T: Targets<A>>(&mut self, x: &ArrayRef2<A>, t: &T) -> Result<()> {
         self.push_rows(x.view(), t.as_matrix(), None)
     }
@@ -253,6 +293,7 @@ impl<A: Scalar> Accumulator<A> {
         check_matrix("inputs", x)?;
         check_matrix("targets", t)?;
         let bounds = Bounds::of(x, t, weights, self.bounded);
+        let far = self.far_off(x, weights)?;
         let before = (self.pending.len(), self.rows, self.weighted_rows);
         if self.pending.len() / self.columns() + x.nrows() >= self.block() {
             // The triangle will change: an error after that must leave no trace.
@@ -260,6 +301,7 @@ impl<A: Scalar> Accumulator<A> {
             next.take_in(x, t, weights)?;
             *self = next;
             self.widen_bounds(bounds);
+            self.far = far;
             return Ok(());
         }
         self.take_in(x, t, weights).inspect_err(|_| {
@@ -267,6 +309,7 @@ impl<A: Scalar> Accumulator<A> {
             (self.rows, self.weighted_rows) = (before.1, before.2);
         })?;
         self.widen_bounds(bounds);
+        self.far = far;
         Ok(())
     }
 
@@ -348,9 +391,14 @@ impl<A: Scalar> Accumulator<A> {
         next.widen_bounds(other.bounds.take());
         next.flush()?;
         other.flush()?;
-        next.absorb(&(&other.triangle * &other.scales))?;
+        let mut rows = &other.triangle * &other.scales;
+        next.take_over(&other, rows.view_mut());
+        next.absorb(&rows)?;
         next.rows = next.rows.saturating_add(other.rows);
         next.weighted_rows = next.weighted_rows.saturating_add(other.weighted_rows);
+        for (far, more) in next.far.iter_mut().zip(&other.far) {
+            *far = far.saturating_add(*more);
+        }
         *self = next;
         Ok(())
     }
@@ -395,8 +443,9 @@ impl<A: Scalar> Accumulator<A> {
             return Ok(());
         }
         let pending = std::mem::take(&mut self.pending);
-        let block =
-            ArrayView2::from_shape((rows, self.columns()), &pending).map_err(|_| OVERFLOW)?;
+        let shape = (rows, self.columns());
+        let mut block = Array2::from_shape_vec(shape, pending).map_err(|_| OVERFLOW)?;
+        self.take_off(block.view_mut());
         self.absorb(&block)
     }
 

@@ -89,6 +89,38 @@ pub enum Error {
         /// What differs.
         what: &'static str,
     },
+    /// An input that was constant in the rows that its standardisation was measured on is not in
+    /// others: it would be lost.
+    #[error(
+        "input {input} (counted from 0) was {constant} in all rows that the scaler was measured on \
+         and is {value} in row {row}: it would be ignored; measure the scaler on rows like these \
+         (ScalerBuilder)"
+    )]
+    ConstantInput {
+        /// Which input.
+        input: usize,
+        /// The first row where it is not what it was.
+        row: usize,
+        /// What it was.
+        constant: f64,
+        /// What it is.
+        value: f64,
+    },
+    /// Rows are not like those that the standardisation of inputs was measured on: too many of them
+    /// lie where neurons are saturated.
+    #[error(
+        "input {input} (counted from 0) is more than 10 deviations from the scaler's mean in {far} \
+         of {rows} rows: the scaler was measured on rows unlike these; measure it on rows like them \
+         (ScalerBuilder)"
+    )]
+    UnlikeRows {
+        /// Which input.
+        input: usize,
+        /// Rows where it is so far off.
+        far: u64,
+        /// Rows so far.
+        rows: u64,
+    },
     /// A factorisation did not converge.
     #[error("{what} did not converge")]
     NoConvergence {

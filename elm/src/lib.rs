@@ -63,6 +63,7 @@ mod scalar;
 mod scaler;
 mod simd;
 pub mod solve;
+mod stats;
 pub mod tune;
 pub mod uncertainty;
 pub mod validate;
@@ -77,7 +78,7 @@ pub use model::{CheckedParams, ElmParams, Targets};
 pub use network::Elm;
 pub use predictor::{Predictor, Scratch};
 pub use scalar::Scalar;
-pub use scaler::Scaler;
+pub use scaler::{Scaler, ScalerBuilder};
 pub use tune::Tuner;
 pub use uncertainty::UncertainElm;
 

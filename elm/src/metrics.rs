@@ -16,6 +16,7 @@ use ndarray::{Array1, ArrayRef1, ArrayView1, ArrayView2, Axis};
 use crate::error::{Error, Result};
 use crate::scalar::{Scalar, power_of_two};
 use crate::solve::check_length;
+use crate::stats::{Sum, sum};
 
 /// Root mean squared error.
 ///
@@ -24,9 +25,7 @@ use crate::solve::check_length;
 /// [`Error::NotFinite`] for a NaN or infinity.
 pub fn rmse<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<f64> {
     check_lengths(predicted, truth)?;
-    let squares: f64 = pairs(predicted, truth)
-        .map(|(p, t)| (p - t) * (p - t))
-        .sum();
+    let squares = sum(pairs(predicted, truth).map(|(p, t)| (p - t) * (p - t)));
     if in_range(squares) {
         return Ok((squares / truth.len() as f64).sqrt());
     }
@@ -44,17 +43,17 @@ pub fn mae<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<
     check_lengths(predicted, truth)?;
     let n = truth.len() as f64;
     let errors = || pairs(predicted, truth).map(|(p, t)| (p - t).abs());
-    let sum: f64 = errors().sum();
-    if sum.is_finite() {
-        return Ok(sum / n);
+    let whole = sum(errors());
+    if whole.is_finite() {
+        return Ok(whole / n);
     }
     check_finite(predicted, truth)?;
     // Divided before it is summed: the sum of many errors of 1e308 is out of range.
-    Ok(errors().map(|error| error / n).sum())
+    Ok(sum(errors().map(|error| error / n)))
 }
 
-/// Pearson's correlation coefficient; `None` where it does not exist, that is, where one of the
-/// two is constant (to rounding).
+/// Pearson's correlation coefficient; `None` where it does not exist, that is, where the values of
+/// one of the two are all equal.
 ///
 /// # Errors
 /// [`Error::Shape`] when the lengths differ, [`Error::Empty`] when there is nothing to compare,
@@ -75,20 +74,22 @@ pub fn correlation<A: Scalar>(
         let scaled = pairs(predicted, truth).map(|(p, t)| (p * factor_p, t * factor_t));
         sums = CentredSums::of(scaled);
     }
-    // The mean of n equal numbers is exact to n roundings; a spread below that is no spread.
-    let noise = truth.len() as f64 * f64::EPSILON;
-    let is_constant = |squares: f64, mean: f64| squares.sqrt() <= noise * mean.abs();
-    if is_constant(sums.pp, sums.mean_p) || is_constant(sums.tt, sums.mean_t) {
+    let varies = sums.pp > 0.0 && sums.tt > 0.0;
+    if !varies || is_constant(predicted) || is_constant(truth) {
         return Ok(None);
     }
     let r = sums.pt / (sums.pp.sqrt() * sums.tt.sqrt());
     Ok(Some(r.clamp(-1.0, 1.0)))
 }
 
-/// Of two columns the means, and the sums of squares and products about them.
+/// Whether all values are equal: their mean may round, so that their sum of squares about it need not
+/// be 0.
+fn is_constant<A: Scalar>(values: &ArrayRef1<A>) -> bool {
+    values.iter().all(|value| *value == values[0])
+}
+
+/// Of two columns the sums of squares and products about their means.
 struct CentredSums {
-    mean_p: f64,
-    mean_t: f64,
     pp: f64,
     tt: f64,
     pt: f64,
@@ -96,26 +97,32 @@ struct CentredSums {
 
 impl CentredSums {
     fn of(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Self {
-        let (mut n, mut sum_p, mut sum_t) = (0.0, 0.0, 0.0);
+        let (mut n, mut sum_p, mut sum_t) = (0.0, Sum::default(), Sum::default());
         for (p, t) in pairs.clone() {
             n += 1.0;
-            sum_p += p;
-            sum_t += t;
+            sum_p.add(p);
+            sum_t.add(t);
         }
-        let (mean_p, mean_t) = (sum_p / n, sum_t / n);
-        let (mut pp, mut tt, mut pt) = (0.0, 0.0, 0.0);
+        let (mean_p, mean_t) = (sum_p.value() / n, sum_t.value() / n);
+        let (mut rest_p, mut rest_t) = (Sum::default(), Sum::default());
+        let (mut pp, mut tt, mut pt) = (Sum::default(), Sum::default(), Sum::default());
         for (p, t) in pairs {
             let (p, t) = (p - mean_p, t - mean_t);
-            pp += p * p;
-            tt += t * t;
-            pt += p * t;
+            rest_p.add(p);
+            rest_t.add(t);
+            pp.add(p * p);
+            tt.add(t * t);
+            pt.add(p * t);
         }
+        // What the means have missed, and what that has added.
+        let (rest_p, rest_t) = (rest_p.value(), rest_t.value());
+        pp.add(-rest_p * rest_p / n);
+        tt.add(-rest_t * rest_t / n);
+        pt.add(-rest_p * rest_t / n);
         Self {
-            mean_p,
-            mean_t,
-            pp,
-            tt,
-            pt,
+            pp: pp.value(),
+            tt: tt.value(),
+            pt: pt.value(),
         }
     }
 }
@@ -157,10 +164,12 @@ fn scaled_root_mean_square(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> f
     }
     let unit = power_of_two(largest);
     let factor = unit.recip();
-    let (squares, total) = pairs.fold((0.0, 0.0), |(squares, total), (value, weight)| {
-        (squares + weight * (value * factor).powi(2), total + weight)
-    });
-    unit * (squares / total).sqrt()
+    let (mut squares, mut total) = (Sum::default(), Sum::default());
+    for (value, weight) in pairs {
+        squares.add(weight * (value * factor).powi(2));
+        total.add(weight);
+    }
+    unit * (squares.value() / total.value()).sqrt()
 }
 
 fn check_lengths<A: Scalar>(predicted: &ArrayRef1<A>, truth: &ArrayRef1<A>) -> Result<()> {
@@ -251,6 +260,23 @@ mod tests {
         let (constant, t) = (Array1::from_elem(7, 0.1), Array1::linspace(0.0, 1.0, 7));
         assert_eq!(correlation(&constant, &t).unwrap(), None);
         assert_eq!(correlation(&t, &constant).unwrap(), None);
+    }
+
+    #[test]
+    fn a_million_rows_cost_neither_a_constant_nor_a_small_variation() {
+        let rows = 1_000_000;
+        let t = Array1::from_shape_fn(rows, |row| f64::from((row % 7) as u8));
+        let constant = Array1::from_elem(rows, 273.15);
+        assert_eq!(correlation(&constant, &t).unwrap(), None);
+        // Exact multiples of 2^-30 beside a mean of 1e6.
+        let small = t.mapv(|t| 1e6 + t * 0.5_f64.powi(30));
+        let r = correlation(&small, &t).unwrap().unwrap();
+        approx::assert_relative_eq!(r, 1.0, max_relative = 1e-14);
+        let wrong = &constant + 0.1;
+        let error = (273.15 + 0.1) - 273.15;
+        for found in [mae(&wrong, &constant), rmse(&wrong, &constant)] {
+            approx::assert_relative_eq!(found.unwrap(), error, max_relative = 2.0 * f64::EPSILON);
+        }
     }
 
     #[test]

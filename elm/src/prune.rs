@@ -62,7 +62,7 @@ use serde::{Deserialize, Serialize};
 use crate::bounds::Bounds;
 use crate::error::{Error, Result};
 use crate::linalg::{Kernel, Symmetric, Triangular};
-use crate::model::{CheckedParams, Drawn, ElmParams, Targets};
+use crate::model::{CheckedParams, Drawn, ElmParams, Rows, Targets};
 use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::solve::frame::{Frame, Prepared};
@@ -137,7 +137,8 @@ impl<A: Scalar> CheckedParams<A> {
     }
 
     /// As [`fit_pruned`](Self::fit_pruned), with a weight for the squared residual of each row, which
-    /// decides what is useful as well.
+    /// decides what is useful as well, and counts in all else as in
+    /// [`fit_weighted`](Self::fit_weighted).
     ///
     /// # Errors
     /// Those of [`fit_pruned`](Self::fit_pruned) and [`LeastSquares::weights`].
@@ -155,12 +156,13 @@ impl<A: Scalar> CheckedParams<A> {
             });
         };
         keep.check(self.params().neurons())?;
-        let t = t.as_matrix();
+        let rows = Rows::new(x.view(), t.as_matrix(), weights)?;
+        let (t, weights) = (rows.t(), rows.weights());
         let Drawn {
             scaler,
             hidden,
             design,
-        } = self.draw(x.view(), t)?;
+        } = self.draw(&rows)?;
         let wide = (A::widen(design.view()), A::widen(t));
         let wide_weights = weights.map(A::widen);
         let mut problem = LeastSquares::of_views(wide.0.view(), wide.1.view())?;
@@ -186,7 +188,7 @@ impl<A: Scalar> CheckedParams<A> {
                 hidden.select(&kept),
                 self.links_directly(),
                 solution,
-                Bounds::of(x.view(), t, weights, self.is_bounded()),
+                Bounds::of(rows.x(), t, weights, self.is_bounded()),
             ),
             kept,
             path,

@@ -39,6 +39,7 @@ use crate::model::{CheckedParams, ElmParams, Targets};
 use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::solve::Solver;
+use crate::stats;
 use crate::validate::Validator;
 
 /// A fitted network that knows how far off it may be; made by [`ElmParams::fit_uncertain`] and
@@ -198,12 +199,13 @@ impl<A: Scalar> UncertainElm<A> {
         if members.len() > 1 {
             model.set_errors(residuals.view(), left_out.view());
         }
-        let rows = A::from_f64(residuals.nrows() as f64);
+        let rows = residuals.nrows() as f64;
         let noise = Zip::from(residuals.columns())
             .and(left_out.columns())
             .map_collect(|r, l| {
+                let products = r.iter().zip(l).map(|(r, l)| r.as_f64() * l.as_f64());
                 // Each product is a square over 1 - h, so only rounding can make it negative.
-                (r.dot(&l).max(A::zero()) / rows).sqrt()
+                A::from_f64((stats::sum(products).max(0.0) / rows).sqrt())
             });
         Ok(Self {
             model,

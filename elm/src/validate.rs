@@ -50,7 +50,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 use crate::solve::ridge::answer;
-use crate::solve::spectrum::{RowSpectrum, Spectrum, rounding};
+use crate::solve::spectrum::{RowSpectrum, Spectrum};
 use crate::solve::{LeastSquares, Reason, Ridge, Solution, check_length, check_room, in_range};
 pub use fits::FoldFit;
 use fold::Fold;
@@ -416,7 +416,7 @@ impl<A: Scalar> Validator<A> {
             (Some(&largest), Some(&smallest)) => largest / smallest,
             _ => A::one(),
         };
-        rounding::<A>(self.rows(), self.rows.spectrum.vt.ncols()) * condition
+        self.rows.spectrum.level() * condition
     }
 
     /// The residuals, in outer units, of the rows of weight 0 at `places` when `rows`, which have

@@ -195,7 +195,7 @@ impl BrdfParams {
     /// Where these measurements cannot be fitted.
     pub fn fit_model(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<BrdfModel> {
         check(pairs, values)?;
-        let x = self.features.compute(pairs);
+        let x = self.features.compute_training(pairs);
         let link = self.link.fit(values)?;
         let t = link.to_targets(values)?;
         // Directions are bounded by themselves, and measurements end short of the horizon.

@@ -46,7 +46,7 @@ impl Fit for ScaledOnce {
         count: usize,
         done: &mut dyn FnMut(usize),
     ) -> Result<Vec<Array2<f64>>> {
-        let x = self.0.features.compute(pairs);
+        let x = self.0.features.compute_training(pairs);
         let network = self.0.network.clone().bounded(false).check()?;
         let fits = network.cross_fits(&x, &values, folds)?;
         let mut all = Vec::with_capacity(count);

@@ -1,6 +1,7 @@
 //! Standardised inputs and transformed targets, as all interpolators use them.
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
+use elm::Scaler;
+use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
 
 use crate::brdf::{check, check_directions};
 use crate::error::Result;
@@ -13,9 +14,7 @@ use crate::link::{FittedLink, Link};
 pub(super) struct Frame {
     features: Features,
     link: FittedLink,
-    mean: Array1<f64>,
-    /// 1 / standard deviation; 0 for an input that is constant over the training rows.
-    factor: Array1<f64>,
+    scaler: Scaler<f64>,
 }
 
 impl Frame {
@@ -30,30 +29,18 @@ impl Frame {
         check(pairs, values)?;
         let link = link.fit(values)?;
         let targets = link.to_targets(values)?;
-        let raw = features.compute(pairs);
-        let rows = raw.nrows() as f64;
-        let mean = raw.sum_axis(Axis(0)) / rows;
-        let deviation = (&raw - &mean).mapv(|d| d * d).sum_axis(Axis(0)) / rows;
-        // Inputs are of order one; a spread below this is rounding of a constant.
-        let factor = deviation.mapv(|v| {
-            if v.sqrt() > 1e-12 {
-                1.0 / v.sqrt()
-            } else {
-                0.0
-            }
-        });
+        let raw = features.compute_training(pairs);
         let frame = Self {
             features,
             link,
-            mean,
-            factor,
+            scaler: Scaler::measured(&raw)?,
         };
         let x = frame.standardise(raw);
         Ok((frame, x, targets))
     }
 
     fn standardise(&self, raw: Array2<f64>) -> Array2<f64> {
-        (raw - &self.mean) * &self.factor
+        (raw - &self.scaler.mean()) * &self.scaler.factor()
     }
 
     /// Points of these directions, shape (pairs, inputs).
@@ -80,7 +67,7 @@ impl Frame {
     }
 
     pub(super) fn inputs(&self) -> usize {
-        self.mean.len()
+        self.scaler.mean().len()
     }
 
     /// Numbers kept for each channel.

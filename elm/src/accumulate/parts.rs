@@ -1,6 +1,6 @@
 //! An accumulator from outside, before its parts are known to fit together.
 
-use ndarray::{Array1, Array2};
+use ndarray::{Array1, Array2, Axis};
 use serde::Deserialize;
 
 use super::{Accumulator, BLOCK, OVERFLOW};
@@ -25,8 +25,11 @@ pub(super) struct Parts<A: Scalar> {
     outputs: usize,
     rows: u64,
     weighted_rows: u64,
+    far: Vec<u64>,
+    unlike_rows: bool,
     triangle: Array2<A>,
     scales: Array1<A>,
+    shift: Option<Array1<A>>,
     pending: Vec<A>,
     bounded: bool,
     bounds: Option<Bounds<A>>,
@@ -50,6 +53,7 @@ impl<A: Scalar> TryFrom<Parts<A>> for Accumulator<A> {
         check_length("outputs", columns.saturating_sub(own), parts.outputs)?;
         check_length("rows of the triangle", parts.triangle.nrows(), columns)?;
         check_length("scales", parts.scales.len(), columns)?;
+        check_length("counts of inputs", parts.far.len(), parts.inputs)?;
         if parts.weighted_rows > parts.rows {
             return Err(Error::Shape {
                 what: "rows of positive weight",
@@ -65,6 +69,10 @@ impl<A: Scalar> TryFrom<Parts<A>> for Accumulator<A> {
             });
         }
         check_length("values in a pending row", parts.pending.len() % columns, 0)?;
+        if let Some(shift) = &parts.shift {
+            check_length("shifts", shift.len(), columns - 1)?;
+            check_matrix("shifts", shift.view().insert_axis(Axis(0)))?;
+        }
         let good = |scale: &A| scale.is_finite() && *scale > A::zero();
         if !(parts.scales.iter().all(good) && parts.pending.iter().all(|v| v.is_finite())) {
             return Err(OVERFLOW);
@@ -79,8 +87,11 @@ impl<A: Scalar> TryFrom<Parts<A>> for Accumulator<A> {
             outputs,
             rows,
             weighted_rows,
+            far,
+            unlike_rows,
             triangle,
             scales,
+            shift,
             pending,
             bounded,
             bounds,
@@ -95,8 +106,11 @@ impl<A: Scalar> TryFrom<Parts<A>> for Accumulator<A> {
             outputs,
             rows,
             weighted_rows,
+            far,
+            unlike_rows,
             triangle,
             scales,
+            shift,
             pending,
             bounded,
             bounds,

@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::linalg::Triangular;
 use crate::scalar::{Scalar, power_of_two};
 use crate::solve::frame::Frame;
-use crate::solve::spectrum::{Spectrum, rounding};
+use crate::solve::spectrum::Spectrum;
 
 impl<A: Scalar> Accumulator<A> {
     /// The problem in the coordinates of its singular vectors, as a batch fit has it.
@@ -16,7 +16,6 @@ impl<A: Scalar> Accumulator<A> {
         let neurons = self.columns() - self.outputs - extra;
         let (hidden, targets) = (extra..extra + neurons, extra + neurons..);
         let rows = usize::try_from(self.rows).unwrap_or(usize::MAX);
-        let level = rounding::<A>(rows, self.columns());
 
         // Neurons share one scale, so that the singular values are those of the whole matrix.
         let scales = self.scales.slice(s![hidden.clone()]);
@@ -41,20 +40,28 @@ impl<A: Scalar> Accumulator<A> {
             (Array1::zeros(neurons), Array1::zeros(self.outputs));
         if self.intercept {
             let first = self.triangle.row(0);
-            let mean =
-                |column: usize| first[column] / first[0] * (self.scales[column] / self.scales[0]);
+            let relative = |column: usize| self.scales[column] / self.scales[0] / first[0];
+            let mean = |column: usize| {
+                let shift = self.shift.as_ref().map_or(A::zero(), |s| s[column - 1]);
+                shift + first[column] * relative(column)
+            };
+            // What centring leaves of a constant is the rounding of its values, and would pass for a
+            // feature; it does not grow with the rows.
+            let bound = A::from_f64(4.0) * A::epsilon();
+            let is_constant = |column: usize| {
+                let left = self.triangle.slice(s![1..=column, column]);
+                let deviation = left.dot(&left).sqrt() * relative(column).abs();
+                deviation <= bound * mean(column).abs()
+            };
             hidden_mean = hidden.clone().map(mean).collect();
             target_mean = (extra + neurons..self.columns()).map(mean).collect();
-            // What centring leaves of a constant is rounding, and would pass for a feature.
             for (column, place) in hidden.clone().enumerate() {
-                let left = self.triangle.slice(s![1..=place, place]);
-                if left.dot(&left).sqrt() <= level * first[place].abs() {
+                if is_constant(place) {
                     h.column_mut(column).fill(A::zero());
                 }
             }
             for (output, place) in (extra + neurons..self.columns()).enumerate() {
-                let left = self.triangle.slice(s![1..=place, place]);
-                if left.dot(&left).sqrt() <= level * first[place].abs() {
+                if is_constant(place) {
                     t.column_mut(output).fill(A::zero());
                     rest.column_mut(output).fill(A::zero());
                 }

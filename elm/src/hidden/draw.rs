@@ -1,6 +1,6 @@
 //! Drawing the random layer from a seed.
 
-use ndarray::{Array1, Array2, ArrayView2, s};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, s};
 use ndarray_rand::RandomExt;
 use ndarray_rand::rand_distr::{StandardNormal, StandardUniform};
 use rand::{Rng, SeedableRng};
@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::{Group, HiddenLayer};
 use crate::activation::Activation;
 use crate::scalar::Scalar;
+use crate::stats::Sum;
 
 /// The distribution that hidden weights and biases are drawn from, before scaling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -51,7 +52,8 @@ pub enum Biases {
     /// Drawn as the weights are, and multiplied by a scale of their own.
     Scaled(f64),
     /// Chosen so that each neuron's weighted sum is 0 at a training row drawn for it: the bend or
-    /// bump of every neuron then lies where there are data, whatever the scale of the weights.
+    /// bump of every neuron then lies where there are data, whatever the scale of the weights. Rows
+    /// that have weights of their own are drawn in proportion to them.
     OnData,
 }
 
@@ -64,7 +66,7 @@ pub enum Kind {
     #[default]
     Projection,
     /// The distance $\lVert s \odot (x - c_k) \rVert$ from a centre, a training row drawn for the
-    /// neuron (no row twice until all are taken), with each input multiplied by the scale of the
+    /// neuron (no row twice until all are taken; in proportion to its weight), with each input multiplied by the scale of the
     /// weights, $s$. With [`Activation::Gaussian`] this is a radial basis function
     /// $e^{-\lVert s \odot (x - c_k) \rVert^2}$, whose width is the scale's inverse.
     Radial,
@@ -167,8 +169,13 @@ const WEIGHTS: u64 = 0;
 const ROWS: u64 = 2;
 
 impl<A: Scalar> Plan<A> {
-    /// Draws a layer for these (standardised) training rows.
-    pub(crate) fn draw(&self, x: ArrayView2<'_, A>) -> HiddenLayer<A> {
+    /// Draws a layer for these (standardised) training rows with these positive weights.
+    pub(crate) fn draw(
+        &self,
+        x: ArrayView2<'_, A>,
+        weights: Option<ArrayView1<'_, A>>,
+    ) -> HiddenLayer<A> {
+        let places = Places::new(x.nrows(), weights);
         let neurons = self.groups.iter().map(|group| group.count).sum();
         let mut layer = HiddenLayer {
             weights: Array2::zeros((x.ncols(), neurons)),
@@ -186,12 +193,12 @@ impl<A: Scalar> Plan<A> {
             random.set_stream(stream + WEIGHTS);
             let (weights, biases, radial) = match group.kind {
                 Kind::Projection => {
-                    let (weights, biases) = self.projections(x, group, stream, random);
+                    let (weights, biases) = self.projections(x, &places, group, stream, random);
                     (weights, biases, None)
                 }
                 Kind::Radial => {
                     random.set_stream(stream + ROWS);
-                    let (centres, scales) = self.centres(x, group, &mut random);
+                    let (centres, scales) = self.centres(x, &places, group, &mut random);
                     (centres, Array1::zeros(group.count), Some(scales))
                 }
             };
@@ -216,6 +223,7 @@ impl<A: Scalar> Plan<A> {
     fn projections(
         &self,
         x: ArrayView2<'_, A>,
+        places: &Places,
         group: &Neurons<A>,
         stream: u64,
         mut random: ChaCha8Rng,
@@ -253,10 +261,10 @@ impl<A: Scalar> Plan<A> {
             Biases::OnData => {
                 random = ChaCha8Rng::seed_from_u64(self.seed);
                 random.set_stream(stream + ROWS);
-                let rows = weights.columns().into_iter().map(|column| {
-                    let row = random.random_range(0..x.nrows().max(1));
-                    -column.dot(&x.row(row))
-                });
+                let rows = weights
+                    .columns()
+                    .into_iter()
+                    .map(|column| -column.dot(&x.row(places.any(&mut random))));
                 rows.collect()
             }
         };
@@ -267,25 +275,89 @@ impl<A: Scalar> Plan<A> {
     fn centres(
         &self,
         x: ArrayView2<'_, A>,
+        places: &Places,
         group: &Neurons<A>,
         random: &mut ChaCha8Rng,
     ) -> (Array2<A>, Array1<A>) {
         let scales = Array1::from_shape_fn(x.ncols(), |input| {
             A::from_f64(self.scale * group.scale * self.input_scale(input))
         });
-        // A shuffle that stops half-way, so that fewer neurons are the beginning of more.
-        let mut rows: Vec<usize> = (0..x.nrows()).collect();
+        let rows = places.without_repetition(group.count, random);
         let mut centres = Array2::zeros((x.ncols(), group.count));
-        for (neuron, mut centre) in centres.columns_mut().into_iter().enumerate() {
-            let place = neuron % rows.len().max(1);
-            if !rows.is_empty() {
-                let other = random.random_range(place..rows.len());
-                rows.swap(place, other);
-            }
-            if let Some(&row) = rows.get(place) {
-                centre.assign(&(&x.row(row) * &scales));
-            }
+        for (mut centre, row) in centres.columns_mut().into_iter().zip(rows) {
+            centre.assign(&(&x.row(row) * &scales));
         }
         (centres, scales)
+    }
+}
+
+/// Rows to lay neurons on, drawn in proportion to their weights.
+struct Places {
+    rows: usize,
+    /// For weights that differ the sum of those up to and with each row, as a share of all.
+    shares: Option<Vec<f64>>,
+}
+
+impl Places {
+    fn new<A: Scalar>(rows: usize, weights: Option<ArrayView1<'_, A>>) -> Self {
+        let differing = weights.filter(|weights| weights.iter().any(|w| *w != weights[0]));
+        let shares = differing.map(|weights| {
+            // Relative to the largest, so that their sum is in range.
+            let largest = weights.iter().fold(0.0, |m: f64, w| m.max(w.as_f64()));
+            let mut sum = Sum::default();
+            let sums = weights.iter().map(|w| {
+                sum.add(w.as_f64() / largest);
+                sum.value()
+            });
+            let mut shares: Vec<f64> = sums.collect();
+            shares.iter_mut().for_each(|share| *share /= sum.value());
+            shares
+        });
+        Self { rows, shares }
+    }
+
+    /// A row.
+    fn any(&self, random: &mut ChaCha8Rng) -> usize {
+        match &self.shares {
+            None => random.random_range(0..self.rows.max(1)),
+            Some(shares) => {
+                // As many random bits as an unweighted draw takes, and used alike: rows that are
+                // repeated one after the other are drawn as one that weighs as much.
+                let place = f64::from(random.random::<u32>()) / 2.0_f64.powi(32);
+                let row = shares.partition_point(|share| *share <= place);
+                row.min(self.rows.saturating_sub(1))
+            }
+        }
+    }
+
+    /// So many rows, none twice until all are taken. Fewer are the beginning of more.
+    fn without_repetition(&self, count: usize, random: &mut ChaCha8Rng) -> Vec<usize> {
+        let mut rows: Vec<usize> = (0..self.rows).collect();
+        if rows.is_empty() {
+            return rows;
+        }
+        let Some(shares) = &self.shares else {
+            // A shuffle that stops half-way.
+            let drawn = (0..count).map(|number| {
+                let place = number % rows.len();
+                let other = random.random_range(place..rows.len());
+                rows.swap(place, other);
+                rows[place]
+            });
+            return drawn.collect();
+        };
+        // Of exponential times with the weights for rates the shortest is drawn first (Efraimidis and
+        // Spirakis, Weighted random sampling with a reservoir, Information Processing Letters 97,
+        // 2006).
+        let mut before = 0.0;
+        let times = shares.iter().map(|&share| {
+            let rate = share - before;
+            before = share;
+            let unit: f64 = random.random();
+            -(-unit).ln_1p() / rate
+        });
+        let times: Vec<f64> = times.collect();
+        rows.sort_by(|&a, &b| times[a].total_cmp(&times[b]));
+        rows.into_iter().cycle().take(count).collect()
     }
 }

@@ -12,7 +12,7 @@ fn plan<A: Scalar>(neurons: usize, seed: u64) -> Plan<A> {
 }
 
 fn draw(neurons: usize, seed: u64) -> HiddenLayer<f64> {
-    plan(neurons, seed).draw(array![[0.5, -1.0, 2.0]].view())
+    plan(neurons, seed).draw(array![[0.5, -1.0, 2.0]].view(), None)
 }
 
 #[test]
@@ -63,8 +63,8 @@ fn rows() -> Array2<f64> {
 #[test]
 fn in_a_mixed_layer_each_group_is_the_beginning_of_a_larger_one_whatever_the_others() {
     let x = rows();
-    let small = mixed::<f64>([4, 3, 9], 5).draw(x.view());
-    let large = mixed::<f64>([6, 8, 31], 5).draw(x.view());
+    let small = mixed::<f64>([4, 3, 9], 5).draw(x.view(), None);
+    let large = mixed::<f64>([6, 8, 31], 5).draw(x.view(), None);
     for (few, from, to) in [(4, 0, 0), (3, 4, 6), (9, 7, 14)] {
         let (few_from, few_to) = (s![.., from..from + few], s![.., to..to + few]);
         assert_eq!(small.weights.slice(few_from), large.weights.slice(few_to));
@@ -77,7 +77,7 @@ fn in_a_mixed_layer_each_group_is_the_beginning_of_a_larger_one_whatever_the_oth
         ..mixed::<f64>([0; 3], 5)
     };
     assert_eq!(
-        plain.draw(x.view()).weights,
+        plain.draw(x.view(), None).weights,
         small.weights.slice(s![.., ..4])
     );
 }
@@ -91,7 +91,7 @@ fn centres_are_scaled_rows_and_none_comes_twice_before_all_have_come_once() {
         input_scales: vec![1.0, 0.25],
         ..plan::<f64>(0, 2)
     };
-    let layer = plan.draw(x.view());
+    let layer = plan.draw(x.view(), None);
     let scaled = &x * &array![1.5, 0.375];
     let mut uses = vec![0; x.nrows()];
     for centre in layer.weights.columns() {
@@ -113,8 +113,8 @@ fn f32_is_the_rounded_f64_layer() {
             single.groups[0].biases = Biases::Scaled(2.0);
             double.groups[0].biases = Biases::Scaled(2.0);
         }
-        let single = single.draw(x.mapv(|x| x as f32).view());
-        let double: HiddenLayer<f64> = double.draw(x.view());
+        let single = single.draw(x.mapv(|x| x as f32).view(), None);
+        let double: HiddenLayer<f64> = double.draw(x.view(), None);
         let (drawn, centres) = (s![.., ..5], s![.., 5..]);
         let rounded = double.weights.mapv(|w| w as f32);
         assert_eq!(single.weights.slice(drawn), rounded.slice(drawn));
@@ -136,7 +136,7 @@ fn biases_on_data_put_every_neuron_at_a_row() {
         scale: 50.0,
         ..plan(20, 4)
     };
-    let layer = plan.draw(x.view());
+    let layer = plan.draw(x.view(), None);
     let z = x.dot(&layer.weights) + &layer.biases;
     for column in z.columns() {
         assert!(column.iter().any(|z: &f64| z.abs() < 1e-12), "{column}");
@@ -150,8 +150,8 @@ fn input_scales_multiply_the_weights_of_their_input() {
         input_scales: vec![1.0, 0.0],
         ..plan(3, 1)
     };
-    let layer = scaled.draw(x.view());
-    let whole = plan::<f64>(3, 1).draw(x.view());
+    let layer = scaled.draw(x.view(), None);
+    let whole = plan::<f64>(3, 1).draw(x.view(), None);
     assert_eq!(layer.weights.row(0), whole.weights.row(0));
     assert_eq!(layer.weights.row(1).sum(), 0.0);
 }
@@ -172,7 +172,7 @@ fn the_forward_pass_is_equation_7() {
 #[test]
 fn a_mixed_layer_is_its_groups_side_by_side_and_radial_neurons_are_bumps_at_their_rows() {
     let x = rows();
-    let layer = mixed::<f64>([4, 3, 20], 1).draw(x.view());
+    let layer = mixed::<f64>([4, 3, 20], 1).draw(x.view(), None);
     let h = layer.forward(x.view());
     for (i, row) in x.rows().into_iter().enumerate() {
         for k in 0..27 {
@@ -208,7 +208,7 @@ fn a_distance_keeps_its_digits_far_from_the_origin() {
         groups: vec![Neurons::radial(9).kind(Kind::Radial)],
         ..plan::<f64>(0, 3)
     };
-    let layer = plan.draw(x.view());
+    let layer = plan.draw(x.view(), None);
     let z = distance::distances(x.view(), layer.weights.view());
     for ((i, k), z) in z.indexed_iter() {
         let apart = &x.row(i) - &layer.weights.column(k);
@@ -225,7 +225,7 @@ fn student_t_weights_have_their_variance_and_a_root_in_common() {
         let mut plan = plan::<f64>(count, 4);
         plan.distribution = Distribution::StudentT(5);
         plan.groups[0].biases = Biases::Scaled(1.0);
-        plan.draw(x.view())
+        plan.draw(x.view(), None)
     };
     let layer = draw(40_000);
     let squares = layer.weights.mapv(|w| w * w);

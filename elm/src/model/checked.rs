@@ -2,7 +2,7 @@
 
 use ndarray::{Array2, ArrayRef2, ArrayView1, ArrayView2};
 
-use super::{ElmParams, Targets};
+use super::{ElmParams, Rows, Targets};
 use crate::bounds::Bounds;
 use crate::error::{Error, Result};
 use crate::hidden::{HiddenLayer, Neurons};
@@ -11,9 +11,7 @@ use crate::predictor::LayerRows;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
 use crate::solve::moments::{HiddenRows, RowSource};
-use crate::solve::{
-    LeastSquares, Solver, check_length, check_matrix, check_room, check_some_weight,
-};
+use crate::solve::{LeastSquares, Solver, check_length, check_matrix, check_room};
 use crate::validate::{FoldFit, HeldOut, Validator};
 
 /// Settings that are in range; made by [`ElmParams::check`].
@@ -50,7 +48,10 @@ impl<A: Scalar> CheckedParams<A> {
 
     /// As [`fit`](Self::fit), with a weight for the squared residual of each row.
     ///
-    /// Standardisation does not use the weights.
+    /// Weights count in all that is made of the rows: means and deviations for the standardisation,
+    /// the rows that biases and centres are laid on (drawn in proportion to their weights), and the
+    /// solve. A row of weight 0 is no row, at a given relative strength of ridge a row of weight 2 is
+    /// two, and a factor of all weights says nothing. Rows of weight 0 must be finite all the same.
     ///
     /// # Errors
     /// Those of [`fit`](Self::fit) and [`LeastSquares::weights`].
@@ -60,9 +61,9 @@ impl<A: Scalar> CheckedParams<A> {
         t: &T,
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<Elm<A>> {
-        let t = t.as_matrix();
-        let (scaler, hidden) = self.prepare(x.view(), t)?;
-        self.output_weights(scaler, hidden, x.view(), t, weights)
+        let rows = Rows::new(x.view(), t.as_matrix(), weights)?;
+        let (scaler, hidden) = self.prepare(&rows)?;
+        self.output_weights(scaler, hidden, &rows)
     }
 
     /// Solves for the output weights of a layer that is there already: drawn by
@@ -98,13 +99,13 @@ impl<A: Scalar> CheckedParams<A> {
         t: &T,
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<Elm<A>> {
-        let t = t.as_matrix();
-        check_data(x.view(), t, hidden.neurons())?;
+        let rows = Rows::new(x.view(), t.as_matrix(), weights)?;
+        check_size(rows.x(), hidden.neurons())?;
         check_length("inputs of the layer", hidden.inputs(), x.ncols())?;
         if let Some(scaler) = &scaler {
             check_length("inputs of the scaler", scaler.mean().len(), x.ncols())?;
         }
-        self.output_weights(scaler, hidden, x.view(), t, weights)
+        self.output_weights(scaler, hidden, &rows)
     }
 
     /// The solution for a layer and data that go together.
@@ -112,13 +113,9 @@ impl<A: Scalar> CheckedParams<A> {
         &self,
         scaler: Option<Scaler<A>>,
         hidden: HiddenLayer<A>,
-        x: ArrayView2<'_, A>,
-        t: ArrayView2<'_, A>,
-        weights: Option<ArrayView1<'_, A>>,
+        rows: &Rows<'_, A>,
     ) -> Result<Elm<A>> {
-        if let Some(weights) = &weights {
-            check_some_weight(weights.view(), x.nrows())?;
-        }
+        let (x, t, weights) = (rows.x(), rows.t(), rows.weights());
         let links = self.0.direct_links;
         let layer = LayerRows::new(&hidden, scaler.as_ref(), links, x);
         let mut source = RowSource {
@@ -155,7 +152,7 @@ impl<A: Scalar> CheckedParams<A> {
         }
         let nowhere = Array2::zeros((1, inputs));
         check_matrix("inputs", nowhere.view())?;
-        self.layer(nowhere.view())
+        self.layer(nowhere.view(), None)
     }
 
     /// Held-out predictions for every row, from one random layer and one factorisation: `folds`
@@ -230,14 +227,14 @@ impl<A: Scalar> CheckedParams<A> {
         x: ArrayView2<'_, A>,
         t: ArrayView2<'_, A>,
     ) -> Result<Validator<A>> {
-        let design = self.draw(x, t)?.design;
+        let design = self.draw(&Rows::new(x, t, None)?)?.design;
         Validator::new(&self.problem(&design, t, None)?)
     }
 
-    /// Checks the data, draws the layer and applies it.
-    pub(crate) fn draw(&self, x: ArrayView2<'_, A>, t: ArrayView2<'_, A>) -> Result<Drawn<A>> {
-        let (scaler, hidden) = self.prepare(x, t)?;
-        let design = self.design(x, scaler.as_ref(), &hidden)?;
+    /// Draws the layer and applies it.
+    pub(crate) fn draw(&self, rows: &Rows<'_, A>) -> Result<Drawn<A>> {
+        let (scaler, hidden) = self.prepare(rows)?;
+        let design = self.design(rows.x(), scaler.as_ref(), &hidden)?;
         Ok(Drawn {
             scaler,
             hidden,
@@ -245,17 +242,14 @@ impl<A: Scalar> CheckedParams<A> {
         })
     }
 
-    /// Checks the data and draws the layer.
-    fn prepare(
-        &self,
-        x: ArrayView2<'_, A>,
-        t: ArrayView2<'_, A>,
-    ) -> Result<(Option<Scaler<A>>, HiddenLayer<A>)> {
-        check_data(x, t, self.0.neurons())?;
-        let scaler = self.0.standardise.then(|| Scaler::measure(x));
+    /// Measures the inputs and draws the layer.
+    fn prepare(&self, rows: &Rows<'_, A>) -> Result<(Option<Scaler<A>>, HiddenLayer<A>)> {
+        let (x, weights) = (rows.x(), rows.weights());
+        check_size(x, self.0.neurons())?;
+        let scaler = self.0.standardise.then(|| Scaler::measure(x, weights));
         let hidden = match &scaler {
-            Some(scaler) if self.needs_rows() => self.layer(scaler.transform(x).view())?,
-            _ => self.layer(x)?,
+            Some(scaler) if self.needs_rows() => self.layer(scaler.transform(x).view(), weights)?,
+            _ => self.layer(x, weights)?,
         };
         Ok((scaler, hidden))
     }
@@ -286,8 +280,12 @@ impl<A: Scalar> CheckedParams<A> {
         }
     }
 
-    /// The random layer for these (standardised) rows.
-    pub(crate) fn layer(&self, x: ArrayView2<'_, A>) -> Result<HiddenLayer<A>> {
+    /// The random layer for these (standardised) rows with these positive weights.
+    pub(crate) fn layer(
+        &self,
+        x: ArrayView2<'_, A>,
+        weights: Option<ArrayView1<'_, A>>,
+    ) -> Result<HiddenLayer<A>> {
         let params = &self.0;
         // A failed allocation would abort the program.
         let per_neuron = x.ncols().saturating_add(1);
@@ -295,7 +293,7 @@ impl<A: Scalar> CheckedParams<A> {
         if !params.input_scales.is_empty() {
             check_length("input scales", params.input_scales.len(), x.ncols())?;
         }
-        Ok(params.plan().draw(x))
+        Ok(params.plan().draw(x, weights))
     }
 
     /// Whether the layer takes more of the rows than the number of their inputs.
@@ -332,11 +330,8 @@ impl<A: Scalar> CheckedParams<A> {
     }
 }
 
-/// Whether data can be fitted by so many neurons.
-fn check_data<A: Scalar>(x: ArrayView2<'_, A>, t: ArrayView2<'_, A>, neurons: usize) -> Result<()> {
-    check_matrix("inputs", x)?;
-    check_matrix("targets", t)?;
-    check_length("rows of targets", t.nrows(), x.nrows())?;
+/// Whether there is room to fit so many neurons to these rows.
+fn check_size<A: Scalar>(x: ArrayView2<'_, A>, neurons: usize) -> Result<()> {
     // Asked before anything is drawn, as a failed allocation would abort the program. Where rows
     // outnumber neurons the matrix itself may not be needed.
     check_room("the hidden-layer matrix", x.nrows().min(neurons), neurons)

@@ -1,6 +1,7 @@
 //! From settings to a fitted network: [`ElmParams`] to [`CheckedParams`] to [`Elm`].
 
 mod checked;
+mod rows;
 
 use ndarray::{ArrayBase, ArrayRef2, ArrayView2, Axis, Data, Ix1, Ix2};
 use serde::{Deserialize, Serialize};
@@ -13,6 +14,7 @@ use crate::scalar::Scalar;
 use crate::solve::Solver;
 pub use checked::CheckedParams;
 pub(crate) use checked::Drawn;
+pub(crate) use rows::Rows;
 
 /// Settings of an extreme learning machine. Setters never fail; [`check`](Self::check) and
 /// [`fit`](Self::fit) say what is out of range.

@@ -4,6 +4,7 @@ use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip};
 
 use super::LeastSquares;
 use crate::scalar::{Scalar, power_of_two};
+use crate::stats;
 
 /// The scales and means that were taken out of a problem.
 #[derive(Debug, Clone)]
@@ -37,7 +38,7 @@ impl<A: Scalar> Frame<A> {
             rows,
             weighted_rows: weights.iter().filter(|w| **w > A::zero()).count(),
             intercept,
-            total_weight: weights.sum(),
+            total_weight: A::from_f64(stats::sum(weights.iter().map(|w| w.as_f64()))),
             root_weights: weights.mapv_into(A::sqrt),
             weight_scale,
             hidden_mean: Array1::zeros(0),
@@ -112,7 +113,7 @@ impl<A: Scalar> Prepared<A> {
         let rows = problem.rows();
         let frame = Frame::of_weights(rows, problem.weights.as_ref(), problem.intercept);
         let (_, weights) = unit_weights(rows, problem.weights.as_ref());
-        let (total_weight, root_weights) = (frame.total_weight, &frame.root_weights);
+        let root_weights = &frame.root_weights;
 
         let largest = weighted_magnitudes(problem.hidden, root_weights);
         let mut hidden_scale = power_of_two(largest.iter().fold(A::zero(), |m, x| m.max(*x)));
@@ -130,9 +131,9 @@ impl<A: Scalar> Prepared<A> {
         let mut hidden_mean = Array1::zeros(hidden.ncols());
         let mut target_mean = Array1::zeros(targets.ncols());
         if problem.intercept {
-            hidden_mean = centre(&mut hidden, &weights, total_weight);
+            hidden_mean = centre(&mut hidden, &weights);
             hidden_mean.mapv_inplace(|m| m * hidden_scale);
-            target_mean = centre(&mut targets, &weights, total_weight);
+            target_mean = centre(&mut targets, &weights);
             target_mean *= &target_scale;
         }
         if problem.weights.is_some() {
@@ -194,16 +195,25 @@ pub(crate) fn weighted_magnitudes<A: Scalar>(
 }
 
 /// Subtracts each column's weighted mean and returns the means. A column whose values differ by
-/// no more than rounding becomes exactly 0: its noise would pass for a feature.
-fn centre<A: Scalar>(matrix: &mut Array2<A>, weights: &Array1<A>, total: A) -> Array1<A> {
+/// no more than rounding becomes exactly 0: its noise would pass for a feature. (These values are
+/// computed, and rounded as they are; how many there are does not matter.)
+fn centre<A: Scalar>(matrix: &mut Array2<A>, weights: &Array1<A>) -> Array1<A> {
     // Weights lie in [0, 1], so this is 1 for every row that is there.
     let largest = weighted_magnitudes(matrix.view(), &weights.mapv(A::ceil));
-    let mut mean = weights.dot(matrix) / total;
-    *matrix -= &mean;
-    // The sum over many rows has rounded; what it missed is the mean of what is left.
-    let missed = weights.dot(matrix) / total;
-    *matrix -= &missed;
-    mean += &missed;
+    let mut mean = vec![0.0; matrix.ncols()];
+    // Twice: the first mean has rounded, and what it missed is the mean of what is left.
+    for _ in 0..2 {
+        let missed = stats::means(matrix.view(), weights.view());
+        for mut row in matrix.rows_mut() {
+            for (value, &missed) in row.iter_mut().zip(&missed) {
+                // Narrowed last, as a mean may have more digits than the values.
+                *value = A::from_f64(value.as_f64() - missed);
+            }
+        }
+        mean.iter_mut()
+            .zip(missed)
+            .for_each(|(m, missed)| *m += missed);
+    }
     for (mut column, &largest) in matrix.columns_mut().into_iter().zip(&largest) {
         let bound = A::from_f64(4.0) * A::epsilon() * largest;
         let varies = Zip::from(&column)
@@ -213,5 +223,5 @@ fn centre<A: Scalar>(matrix: &mut Array2<A>, weights: &Array1<A>, total: A) -> A
             column.fill(A::zero());
         }
     }
-    mean
+    mean.into_iter().map(A::from_f64).collect()
 }

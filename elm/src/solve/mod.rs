@@ -36,7 +36,7 @@ pub(crate) mod spectrum;
 use std::fmt;
 use std::str::FromStr;
 
-use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2};
+use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
@@ -95,7 +95,8 @@ impl<'a, A: Scalar> LeastSquares<'a, A> {
         })
     }
 
-    /// Weighs the squared residual of each row; by default all weights are 1.
+    /// Weighs the squared residual of each row; by default all weights are 1. A row of weight 0 is no
+    /// row.
     ///
     /// # Errors
     /// [`Error::Shape`] when there is not one weight per row, [`Error::Parameter`] when one is
@@ -157,6 +158,13 @@ pub(crate) fn check_some_weight<A: Scalar>(weights: ArrayView1<'_, A>, rows: usi
         return Err(weight_error(0.0));
     }
     Ok(())
+}
+
+/// The rows of positive weight; nothing where that is all rows.
+pub(crate) fn present<A: Scalar>(weights: ArrayView1<'_, A>) -> Option<Vec<usize>> {
+    let counts = |row: &usize| weights[*row] > A::zero();
+    let rows: Vec<usize> = (0..weights.len()).filter(counts).collect();
+    (rows.len() < weights.len()).then_some(rows)
 }
 
 fn weight_error(value: f64) -> Error {
@@ -229,6 +237,22 @@ impl Solver {
     /// answer does not fit the type; [`Error::NoConvergence`] from the factorisation.
     pub fn solve<A: Scalar>(&self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
         self.check()?;
+        let Some(rows) = problem.weights.and_then(present) else {
+            return self.solve_all(problem);
+        };
+        let hidden = problem.hidden.select(Axis(0), &rows);
+        let targets = problem.targets.select(Axis(0), &rows);
+        let weights = problem.weights.map(|w| w.select(Axis(0), &rows));
+        self.solve_all(&LeastSquares {
+            hidden: hidden.view(),
+            targets: targets.view(),
+            weights: weights.as_ref().map(|weights| weights.view()),
+            intercept: problem.intercept,
+        })
+    }
+
+    /// Solves a problem that has no rows of weight 0.
+    fn solve_all<A: Scalar>(&self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
         in_range(match self {
             Self::Inverse(solver) => solver.solve(problem),
             Self::PseudoInverse(solver) => solver.solve(problem),

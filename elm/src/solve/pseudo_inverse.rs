@@ -121,7 +121,7 @@ impl PseudoInverse {
         let norm_of = |gram| largest_eigenvalue(&Symmetric::of_lower(&gram)).map(A::sqrt);
         let largest = norm_of(A::gram(r))?;
         let smallest = norm_of(A::gram(inverse.t()))?.recip();
-        let level = A::from_f64(CLEAR) * rounding(frame.rows, neurons);
+        let level = A::from_f64(CLEAR) * rounding(frame.weighted_rows, neurons);
         let cutoff = A::from_f64(2.0) * self.effective_cutoff(A::zero());
         if smallest <= level.max(cutoff) * largest {
             return None;

@@ -41,7 +41,8 @@ pub(crate) struct RowSpectrum<A: Scalar> {
     /// $\tilde T - U C$: the residual where nothing is held back, shape (rows, outputs).
     pub(crate) residual: Array2<A>,
     /// Share of each row's leverage that lies outside the span of $U$ and the intercept:
-    /// $1 - w_i / \sum w - \sum_j U_{ij}^2$, exactly 0 where they span everything.
+    /// $1 - w_i / \sum w - \sum_j U_{ij}^2$, exactly 0 where they span everything (1 for a row of
+    /// weight 0).
     pub(crate) free: Array1<A>,
     /// The unit vector of the intercept; 0 without one.
     pub(crate) constant: Array1<A>,
@@ -90,7 +91,7 @@ impl<A: Scalar> Spectrum<A> {
         frame: Frame<A>,
     ) -> Result<Self> {
         let lengths = frame.lengths(hidden);
-        let Svd { u, s, vt } = truncate(A::svd(hidden)?, frame.rows);
+        let Svd { u, s, vt } = truncate(A::svd(hidden)?, frame.weighted_rows);
         let c = A::product(u.t(), targets.view());
         if frame.spanned_by(s.len()) {
             unreached.fill(A::zero());
@@ -111,7 +112,7 @@ impl<A: Scalar> Spectrum<A> {
 
     /// The level of rounding error in singular values, relative to the largest.
     pub(crate) fn level(&self) -> A {
-        rounding(self.frame.rows, self.vt.ncols())
+        rounding(self.frame.weighted_rows, self.vt.ncols())
     }
 
     /// The number of singular values above `cutoff` times the largest.
@@ -267,12 +268,20 @@ impl<A: Scalar> RowSpectrum<A> {
             frame,
         } = Prepared::new(problem);
         let lengths = frame.lengths(hidden.view());
-        let Svd { u, s, vt } = truncate(A::svd(hidden.view())?, frame.rows);
+        let Svd { u, s, vt } = truncate(A::svd(hidden.view())?, frame.weighted_rows);
         let c = A::product(u.t(), targets.view());
         let constant = frame.constant_direction();
         let spanned = frame.spanned_by(u.ncols());
+        // A row of weight 0 has no residual, which must not be divided by 0.
+        let absent = |root: A| {
+            if root > A::zero() {
+                A::zero()
+            } else {
+                A::one()
+            }
+        };
         let mut rows = Self {
-            free: Array1::zeros(frame.rows),
+            free: frame.root_weights.mapv(absent),
             residual: Array2::zeros(targets.dim()),
             spectrum: Spectrum {
                 route: Route::Svd,
@@ -320,7 +329,7 @@ impl<A: Scalar> RowSpectrum<A> {
         // is epsilon times its root. There are at most about `neurons` such rows.
         let coarse = A::epsilon().sqrt().sqrt();
         let close: Vec<usize> = (0..u.nrows()).filter(|&i| self.free[i] < coarse).collect();
-        let noise = rounding::<A>(u.nrows(), self.spectrum.vt.ncols());
+        let noise = self.spectrum.level();
         for block in close.chunks(64) {
             let mut units = Array2::zeros((u.nrows(), block.len()));
             for (column, &row) in block.iter().enumerate() {

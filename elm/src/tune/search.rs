@@ -9,6 +9,7 @@ use super::{Criterion, Trial, Tuner};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 use crate::solve::Ridge;
+use crate::stats::Moments;
 use crate::validate::assign_folds;
 
 /// Neurons that the search uses as long as their number is not chosen.
@@ -402,19 +403,9 @@ fn proportional(slopes: &[f64], power: f64) -> Vec<f64> {
     relative.iter().map(|s| s / mean_square.sqrt()).collect()
 }
 
-/// The standard deviation, or 1 where it is 0.
+/// The standard deviation, or 1 for a constant.
 fn deviation<A: Scalar>(column: ArrayView1<'_, A>) -> f64 {
-    let values: Vec<f64> = column.iter().map(|value| value.as_f64()).collect();
-    let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-    if largest == 0.0 {
-        return 1.0;
-    }
-    let count = values.len() as f64;
-    let mean = values.iter().map(|v| v / largest).sum::<f64>() / count;
-    let squares = values
-        .iter()
-        .map(|v| (v / largest - mean).powi(2))
-        .sum::<f64>();
-    let deviation = (squares / count).sqrt() * largest;
-    if deviation > 0.0 { deviation } else { 1.0 }
+    let moments = Moments::of(column.insert_axis(Axis(1)), None);
+    let deviation = moments.deviations().next();
+    deviation.filter(|d| *d > 0.0).unwrap_or(1.0)
 }

@@ -172,7 +172,7 @@ impl<A: Scalar> Fold<A> {
                 units[[row, column]] = A::one();
             }
             units = validator.rows.off_span(units);
-            let level = rounding::<A>(validator.rows(), spectrum.vt.ncols());
+            let level = spectrum.level();
             for mut column in units.columns_mut() {
                 if column.dot(&column).sqrt() <= level {
                     column.fill(A::zero());

@@ -142,7 +142,8 @@ fn weighted_rows_give_the_weighted_batch_answer() {
             .unwrap();
         let w = &w * factor;
         let batch = params.fit_weighted(&x, &t, Some(w.view())).unwrap();
-        let mut accumulator = Accumulator::from_sample(&params, &x, 2).unwrap();
+        let scaler = Scaler::measured_weighted(&x, &w).unwrap();
+        let mut accumulator = Accumulator::with_scaler(&params, scaler, 2).unwrap();
         for start in (0..200).step_by(30) {
             let range = start..200.min(start + 30);
             accumulator
@@ -354,8 +355,8 @@ fn chunks_from_an_iterator_are_fitted_and_its_error_is_passed_on() {
     let model = params
         .fit_chunks((0..3).map(|i| Ok::<_, Error>(chunk(i))))
         .unwrap();
-    let first = x.slice(s![..30, ..]).to_owned();
-    let mut expected = Accumulator::from_sample(&params, &first, 2).unwrap();
+    // Fewer than a thousand rows are measured together.
+    let mut expected = Accumulator::from_sample(&params, &x, 2).unwrap();
     expected.push(&x, &t).unwrap();
     assert_same_fit(&model, &expected.fit().unwrap(), &x, "chunks");
 

@@ -16,4 +16,6 @@ mod prune;
 mod solve;
 mod tune;
 mod uncertainty;
+mod unlike_inputs;
 mod validate;
+mod weights;

@@ -142,7 +142,7 @@ struct Search {
 impl Search {
     fn new(tuned: &Tuned, pairs: &[Pair], channels: usize) -> Result<Self> {
         let set = tuned.features.unwrap_or(Features::SumDifference);
-        let x = set.compute(pairs);
+        let x = set.compute_training(pairs);
         let neurons = tuned.size(NEURONS, x.ncols(), channels, 2, |_| 0)?;
         let limited = tuned.neurons.is_some() || tuned.max_floats.is_some();
         let params = |scales: ArrayView1<'_, f64>| {

@@ -97,7 +97,7 @@ impl Lean {
         check(pairs, values)?;
         let link = Link::default_log().fit(values)?;
         let targets = link.to_targets(values)?;
-        let x = self.features.compute(pairs);
+        let x = self.features.compute_training(pairs);
         let scaler = Scaler::measured(&x)?;
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         random.set_stream(6);

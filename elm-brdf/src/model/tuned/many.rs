@@ -53,7 +53,7 @@ pub(super) fn fit(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) ->
     };
     let setting = search.best()?;
 
-    let x = setting.set.compute(pairs);
+    let x = setting.set.compute_training(pairs);
     let scaler = Scaler::measured(&x)?;
     let neurons = tuned.size(NEURONS, x.ncols(), values.ncols(), 2, drawn)?;
     let count = drawn(neurons);
@@ -155,7 +155,7 @@ struct Inputs {
 
 impl Search<'_> {
     fn inputs(&self, set: Features) -> Result<Inputs> {
-        let fitted = set.compute(&self.fitted.pairs);
+        let fitted = set.compute_training(&self.fitted.pairs);
         Ok(Inputs {
             set,
             scaler: Scaler::measured(&fitted)?,

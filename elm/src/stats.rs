@@ -1,0 +1,523 @@
+//! Sums, means and deviations that are right to a few roundings however many rows there are.
+//! Whatever in this crate takes a mean takes it from here.
+//!
+//! Sums are compensated: each addition's rounding error is kept and added at the end (Ogita, Rump
+//! and Oishi, Accurate Sum and Dot Product, SIAM Journal on Scientific Computing 26(6), 2005,
+//! algorithm `Sum2`), so that $n$ terms cost $u \lvert s \rvert + n^2 u^2 \sum \lvert x_i \rvert$ and not
+//! $n u \sum \lvert x_i \rvert$, with $u$ the roundoff of `f64`, which is what everything is summed in.
+//! Deviations take a second pass about the mean, corrected for the mean's own error, and those of
+//! several blocks of rows are pooled exactly (Chan, Golub and `LeVeque`, Algorithms for Computing the
+//! Sample Variance, The American Statistician 37(3), 1983).
+//!
+//! A column counts as constant where its values are equal, not where its deviation is small: a
+//! threshold would either miss constants, whose mean rounds, or swallow inputs that vary little
+//! beside their mean.
+
+use ndarray::{ArrayView1, ArrayView2};
+use serde::{Deserialize, Serialize};
+
+use crate::scalar::{Scalar, power_of_two};
+
+/// A compensated sum.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct Sum {
+    high: f64,
+    /// What rounding took from `high`.
+    low: f64,
+}
+
+impl Sum {
+    pub(crate) fn add(&mut self, term: f64) {
+        let (high, lost) = two_sum(self.high, term);
+        self.high = high;
+        self.low += lost;
+    }
+
+    /// The sum; infinite or NaN where a term, or the sum on its way, was out of range.
+    pub(crate) fn value(self) -> f64 {
+        self.high + self.low
+    }
+
+    /// The sum divided by a power of two.
+    fn scaled(self, factor: f64) -> Self {
+        Self {
+            high: self.high * factor,
+            low: self.low * factor,
+        }
+    }
+
+    fn is_finite(self) -> bool {
+        self.high.is_finite() && self.low.is_finite()
+    }
+}
+
+impl FromIterator<f64> for Sum {
+    fn from_iter<T: IntoIterator<Item = f64>>(terms: T) -> Self {
+        let mut sum = Self::default();
+        terms.into_iter().for_each(|term| sum.add(term));
+        sum
+    }
+}
+
+/// The sum of all terms.
+pub(crate) fn sum(terms: impl IntoIterator<Item = f64>) -> f64 {
+    terms.into_iter().collect::<Sum>().value()
+}
+
+/// $a + b$ rounded, and what rounding took from it (Knuth, The Art of Computer Programming, volume
+/// 2, section 4.2.2, theorem B).
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let sum = a + b;
+    let b_in_sum = sum - a;
+    (sum, (a - (sum - b_in_sum)) + (b - b_in_sum))
+}
+
+/// The mean of each column with these weights, which must not be negative; 0 of rows that all have
+/// weight 0.
+pub(crate) fn means<A: Scalar, W: Scalar>(
+    matrix: ArrayView2<'_, A>,
+    weights: ArrayView1<'_, W>,
+) -> Vec<f64> {
+    let columns = matrix.ncols();
+    // Apart, so that the sums of several columns are taken at once.
+    let (mut high, mut low) = (vec![0.0; columns], vec![0.0; columns]);
+    let mut total = Sum::default();
+    for (row, weight) in matrix.rows().into_iter().zip(weights) {
+        let weight = weight.as_f64();
+        total.add(weight);
+        for ((high, low), value) in high.iter_mut().zip(&mut low).zip(row) {
+            let (sum, lost) = two_sum(*high, weight * value.as_f64());
+            *high = sum;
+            *low += lost;
+        }
+    }
+    let total = match total.value() {
+        0.0 => 1.0,
+        total => total,
+    };
+    let sums = high.into_iter().zip(low);
+    sums.map(|(high, low)| (high + low) / total).collect()
+}
+
+/// What is known of one column: enough for its mean and deviation, and to go on from there.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Column {
+    least: f64,
+    most: f64,
+    /// Whether a value lies between the two.
+    between: bool,
+    /// A power of two of the size of the largest value, which keeps squares in range: the rest is in
+    /// units of it.
+    unit: f64,
+    mean: f64,
+    /// What rounding took from the mean.
+    mean_low: f64,
+    /// The weighted sum of squares about the mean.
+    squares: Sum,
+}
+
+impl Column {
+    const NOTHING: Self = Self {
+        least: 0.0,
+        most: 0.0,
+        between: false,
+        unit: 1.0,
+        mean: 0.0,
+        mean_low: 0.0,
+        squares: Sum {
+            high: 0.0,
+            low: 0.0,
+        },
+    };
+
+    /// Whether all values are equal.
+    pub(crate) fn is_constant(&self) -> bool {
+        self.least == self.most
+    }
+
+    /// Whether there are two values and no more.
+    pub(crate) fn is_two_valued(&self) -> bool {
+        !self.is_constant() && !self.between
+    }
+
+    /// Half the distance of the largest from the smallest value.
+    pub(crate) fn half_range(&self) -> f64 {
+        if self.is_constant() {
+            return 0.0;
+        }
+        // Halved first: the distance may be out of range.
+        self.most / 2.0 - self.least / 2.0
+    }
+
+    /// The mean; that of equal values is their value, to the last bit.
+    pub(crate) fn mean(&self) -> f64 {
+        if self.is_constant() {
+            return self.least;
+        }
+        (self.unit * (self.mean + self.mean_low)).clamp(self.least, self.most)
+    }
+
+    fn deviation(&self, weight: f64) -> f64 {
+        if self.is_constant() {
+            return 0.0;
+        }
+        let deviation = self.unit * (self.squares.value().max(0.0) / weight).sqrt();
+        if deviation > 0.0 {
+            deviation
+        } else {
+            // All but rows of vanishing weight are equal.
+            self.half_range()
+        }
+    }
+
+    /// Joins another column's rows, the weights of both in one unit.
+    fn join(&mut self, other: &Self, own: f64, others: f64) {
+        let unit = self.unit.max(other.unit);
+        let (here, there) = (self.unit / unit, other.unit / unit);
+        let apart = (other.mean * there - self.mean * here)
+            + (other.mean_low * there - self.mean_low * here);
+        let share = others / (own + others);
+        let (mean, lost) = two_sum(self.mean * here, apart * share);
+        let mean_low = self.mean_low * here + lost;
+        let mut squares = self.squares.scaled(here * here);
+        squares.add(other.squares.value() * there * there);
+        squares.add(apart * apart * own * share);
+        let values = [self.least, self.most, other.least, other.most];
+        let least = self.least.min(other.least);
+        let most = self.most.max(other.most);
+        let between = values.iter().any(|&value| least < value && value < most);
+        *self = Self {
+            least,
+            most,
+            between: between || self.between || other.between,
+            unit,
+            mean,
+            mean_low,
+            squares,
+        };
+    }
+
+    fn is_sound(&self) -> bool {
+        let finite = [self.least, self.most, self.unit, self.mean, self.mean_low];
+        finite.iter().all(|value| value.is_finite())
+            && self.squares.is_finite()
+            && self.unit > 0.0
+            && self.least <= self.most
+    }
+}
+
+/// Means and deviations of columns over rows that may come block by block. Rows of weight 0 are no
+/// rows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Moments {
+    /// Rows of positive weight.
+    rows: u64,
+    /// A power of two that weights are in units of.
+    weight_unit: f64,
+    weight: Sum,
+    columns: Vec<Column>,
+}
+
+impl Moments {
+    /// Of no rows.
+    pub(crate) fn new(columns: usize) -> Self {
+        Self {
+            rows: 0,
+            weight_unit: 1.0,
+            weight: Sum::default(),
+            columns: vec![Column::NOTHING; columns],
+        }
+    }
+
+    /// Of these rows, whose values must be finite, and whose weights, where there are any, must be
+    /// finite and not negative.
+    pub(crate) fn of<A: Scalar>(x: ArrayView2<'_, A>, weights: Option<ArrayView1<'_, A>>) -> Self {
+        let largest = |weights: ArrayView1<'_, A>| {
+            let largest = weights.iter().fold(A::zero(), |m, w| m.max(*w));
+            power_of_two(largest.as_f64())
+        };
+        let weight_unit = weights.map_or(1.0, largest);
+        let weight = |row: usize| match weights {
+            Some(weights) => weights[row].as_f64() / weight_unit,
+            None => 1.0,
+        };
+        let rows = || {
+            let rows = x.rows().into_iter().enumerate();
+            rows.map(|(row, values)| (values, weight(row)))
+                .filter(|(_, weight)| *weight > 0.0)
+        };
+        let mut moments = Self {
+            weight_unit,
+            ..Self::new(x.ncols())
+        };
+        let columns = &mut moments.columns;
+        for (row, weight) in rows() {
+            let first = moments.rows == 0;
+            moments.rows += 1;
+            moments.weight.add(weight);
+            for (column, value) in columns.iter_mut().zip(row) {
+                let value = value.as_f64();
+                if first {
+                    (column.least, column.most) = (value, value);
+                }
+                column.least = column.least.min(value);
+                column.most = column.most.max(value);
+            }
+        }
+        if moments.rows == 0 {
+            return Self::new(x.ncols());
+        }
+        for column in columns.iter_mut() {
+            let largest = column.least.abs().max(column.most.abs());
+            // Zeros have no size: any other rows they are joined with give them theirs.
+            column.unit = power_of_two(largest.max(f64::MIN_POSITIVE));
+        }
+        let total = moments.weight.value();
+        let into_range: Vec<f64> = columns.iter().map(|c| c.unit.recip()).collect();
+        let mut sums = vec![Sum::default(); columns.len()];
+        for (row, weight) in rows() {
+            let parts = columns.iter_mut().zip(&mut sums).zip(&into_range);
+            for (((column, sum), factor), value) in parts.zip(row) {
+                let value = value.as_f64();
+                column.between |= column.least < value && value < column.most;
+                sum.add(weight * (value * factor));
+            }
+        }
+        for (column, sum) in columns.iter_mut().zip(sums) {
+            column.mean = sum.value() / total;
+        }
+        let mut sums = vec![Sum::default(); columns.len()];
+        for (row, weight) in rows() {
+            let parts = columns.iter_mut().zip(&mut sums).zip(&into_range);
+            for (((column, sum), factor), value) in parts.zip(row) {
+                let apart = value.as_f64() * factor - column.mean;
+                sum.add(weight * apart);
+                column.squares.add(weight * apart * apart);
+            }
+        }
+        for (column, sum) in columns.iter_mut().zip(sums) {
+            // What the mean has missed, and what that has added to the squares.
+            column.mean_low = sum.value() / total;
+            column.squares.add(-sum.value() * column.mean_low);
+        }
+        moments
+    }
+
+    /// Joins the rows of `other`, which must have as many columns.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        if other.rows == 0 {
+            return;
+        }
+        if self.rows == 0 {
+            self.clone_from(other);
+            return;
+        }
+        let unit = self.weight_unit.max(other.weight_unit);
+        let (here, there) = (self.weight_unit / unit, other.weight_unit / unit);
+        self.weight = self.weight.scaled(here);
+        let (own, others) = (self.weight.value(), other.weight.value() * there);
+        for (column, other) in self.columns.iter_mut().zip(&other.columns) {
+            column.squares = column.squares.scaled(here);
+            let mut other = *other;
+            other.squares = other.squares.scaled(there);
+            if own + others > 0.0 {
+                column.join(&other, own, others);
+            }
+        }
+        self.weight.add(others);
+        self.weight_unit = unit;
+        self.rows = self.rows.saturating_add(other.rows);
+    }
+
+    /// Rows of positive weight.
+    pub(crate) fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    pub(crate) fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// The standard deviation of each column, with the sum of the weights for divisor; 0 of a
+    /// constant.
+    pub(crate) fn deviations(&self) -> impl Iterator<Item = f64> + '_ {
+        let weight = self.weight.value();
+        self.columns.iter().map(move |c| c.deviation(weight))
+    }
+
+    /// Whether moments from outside can be those of some rows.
+    pub(crate) fn is_sound(&self) -> bool {
+        let empty = self.rows == 0;
+        let weight = self.weight.value();
+        let weighted = self.weight_unit > 0.0 && self.weight_unit.is_finite();
+        weighted
+            && if empty {
+                self.weight == Sum::default() && self.columns.iter().all(|c| *c == Column::NOTHING)
+            } else {
+                weight > 0.0 && self.weight.is_finite() && self.columns.iter().all(Column::is_sound)
+            }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::{Array1, Array2, Axis, array, s};
+    use proptest::prelude::*;
+
+    /// Whole numbers with a fraction that a double has room for: their sums are exact.
+    fn offset(base: f64, rows: usize) -> Array2<f64> {
+        Array2::from_shape_fn((rows, 1), |(row, _)| {
+            base + f64::from((row % 7) as u8) / 64.0
+        })
+    }
+
+    fn measured<A: Scalar>(x: &Array2<A>) -> (f64, f64) {
+        let moments = Moments::of(x.view(), None);
+        let deviation = moments.deviations().next().unwrap();
+        (moments.columns()[0].mean(), deviation)
+    }
+
+    #[test]
+    fn a_million_equal_values_have_their_value_for_mean_and_no_deviation() {
+        for value in [0.1, 273.15, -1e-300, 1e300, 5e-324] {
+            let x = Array2::from_elem((1_000_000, 1), value);
+            assert_eq!(measured(&x), (value, 0.0));
+        }
+        let x = Array2::from_elem((1_000_000, 1), 273.15_f32);
+        assert_eq!(measured(&x), (f64::from(273.15_f32), 0.0));
+    }
+
+    #[test]
+    fn a_million_rows_cost_no_digits() {
+        // 7 divides the number of rows: the values 0 to 6 are equally frequent, their mean is 3 and
+        // their variance 4.
+        let rows = 7 * 142_857;
+        for base in [0.0, 1.0, 1e6, 1e12] {
+            let (mean, deviation) = measured(&offset(base, rows));
+            assert_eq!(mean, base + 3.0 / 64.0);
+            approx::assert_relative_eq!(deviation, 2.0 / 64.0, max_relative = 4.0 * f64::EPSILON);
+        }
+        // Eighths at 1e6 are exact in f32.
+        let x = Array2::from_shape_fn((rows, 1), |(row, _)| {
+            1e6_f32 + f32::from((row % 7) as u8) / 8.0
+        });
+        let (mean, deviation) = measured(&x);
+        assert_eq!(mean, 1e6 + 3.0 / 8.0);
+        approx::assert_relative_eq!(deviation, 2.0 / 8.0, max_relative = 4.0 * f64::EPSILON);
+    }
+
+    #[test]
+    fn values_of_any_size_stay_in_range() {
+        let x = array![[1.0], [2.0], [6.0], [-3.0]];
+        let (mean, deviation) = measured(&x);
+        for size in [1e-320, 1e-300, 1e-150, 1e150, 1e300, 1e307] {
+            let (scaled_mean, scaled_deviation) = measured(&(&x * size));
+            // A subnormal has few digits.
+            let digits = if size < 1e-307 { 1e-2 } else { 1e-14 };
+            approx::assert_relative_eq!(scaled_mean / size, mean, max_relative = digits);
+            approx::assert_relative_eq!(scaled_deviation / size, deviation, max_relative = digits);
+        }
+    }
+
+    #[test]
+    fn constants_and_two_values_are_known_by_their_values() {
+        let x = array![
+            [0.1, 1.0, 0.0, 1.0],
+            [0.1, 1.0 + f64::EPSILON, 5.0, 2.0],
+            [0.1, 1.0, 0.0, 3.0]
+        ];
+        let moments = Moments::of(x.view(), None);
+        let columns = moments.columns();
+        let constant = [true, false, false, false];
+        let two_valued = [false, true, true, false];
+        for (column, (constant, two_valued)) in
+            columns.iter().zip(constant.into_iter().zip(two_valued))
+        {
+            assert_eq!(column.is_constant(), constant);
+            assert_eq!(column.is_two_valued(), two_valued);
+        }
+        assert_eq!(columns[2].half_range(), 2.5);
+        assert!(moments.deviations().skip(1).all(|d| d > 0.0));
+    }
+
+    #[test]
+    fn sums_keep_what_a_running_sum_loses() {
+        let terms = || std::iter::once(1e16).chain(std::iter::repeat_n(1.0, 1000));
+        assert_eq!(sum(terms()), 1e16 + 1000.0);
+        assert_eq!(sum([1e300, 1.0, -1e300]), 1.0);
+    }
+
+    #[test]
+    fn row_by_row_is_as_exact_as_all_at_once() {
+        let x = offset(273.15, 70_000);
+        let mut moments = Moments::new(1);
+        for row in x.axis_chunks_iter(Axis(0), 1) {
+            moments.merge(&Moments::of(row, None));
+        }
+        let (mean, deviation) = measured(&x);
+        let found = moments.deviations().next().unwrap();
+        approx::assert_relative_eq!(
+            moments.columns()[0].mean(),
+            mean,
+            max_relative = f64::EPSILON
+        );
+        approx::assert_relative_eq!(found, deviation, max_relative = 1e-14);
+        assert_eq!(moments.rows(), 70_000);
+    }
+
+    #[test]
+    fn equal_blocks_of_different_values_are_no_constant() {
+        let mut moments = Moments::of(array![[2.0], [2.0]].view(), None);
+        assert!(moments.columns()[0].is_constant());
+        moments.merge(&Moments::of(array![[4.0], [4.0]].view(), None));
+        let column = moments.columns()[0];
+        assert!(column.is_two_valued());
+        assert_eq!(
+            (column.mean(), moments.deviations().next()),
+            (3.0, Some(1.0))
+        );
+        moments.merge(&Moments::of(array![[3.0]].view(), None));
+        assert!(!moments.columns()[0].is_two_valued());
+    }
+
+    proptest! {
+        #[test]
+        fn pooled_moments_are_those_of_all_rows(
+            values in proptest::collection::vec(
+                (prop_oneof![Just(0.0), -1e3..1e3_f64, -1e-3..1e-3_f64], 0.0..3.0_f64), 2..60),
+            cut in 0.0..1.0_f64,
+            power in -200..200_i32,
+        ) {
+            let size = 10.0_f64.powi(power);
+            let x: Array1<f64> = values.iter().map(|(x, _)| x * size).collect();
+            let x = x.insert_axis(Axis(1));
+            let weight = |&(_, w): &(f64, f64)| if w < 0.5 { 0.0 } else { w };
+            let w: Array1<f64> = values.iter().map(weight).collect();
+            let cut = (cut * values.len() as f64) as usize;
+            let part = |range: std::ops::Range<usize>, factor: f64| {
+                let w = &w.slice(s![range.clone()]) * factor;
+                Moments::of(x.slice(s![range, ..]), Some(w.view()))
+            };
+            let all = part(0..values.len(), 1.0);
+            let mut pooled = part(0..cut, 1.0);
+            pooled.merge(&part(cut..values.len(), 1.0));
+            prop_assert!(pooled.is_sound() && all.is_sound());
+            prop_assert_eq!(pooled.rows(), all.rows());
+            if all.rows() == 0 {
+                return Ok(());
+            }
+            let (one, other) = (all.columns()[0], pooled.columns()[0]);
+            prop_assert_eq!(one.is_constant(), other.is_constant());
+            prop_assert_eq!(one.is_two_valued(), other.is_two_valued());
+            let largest = x.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+            let bound = 1e-14 * largest;
+            prop_assert!((one.mean() - other.mean()).abs() <= bound);
+            let (a, b) = (all.deviations().next().unwrap(), pooled.deviations().next().unwrap());
+            prop_assert!((a - b).abs() <= 1e-13 * a, "{} {}", a, b);
+            // A factor of all weights says nothing.
+            let tripled = part(0..values.len(), 3.0).deviations().next().unwrap();
+            prop_assert!((a - tripled).abs() <= 1e-13 * a);
+        }
+    }
+}
