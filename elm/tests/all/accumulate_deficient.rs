@@ -4,7 +4,7 @@
 use crate::common::{amplification, frobenius, normal};
 use elm::solve::{PseudoInverse, Ridge, Solver};
 use elm::{Accumulator, CheckedParams, Elm, ElmParams, Scalar, metrics};
-use ndarray::{Array1, Array2, Axis};
+use ndarray::{Array1, Array2, Axis, s};
 use proptest::prelude::*;
 
 fn accumulated<A: Scalar>(

@@ -105,12 +105,13 @@ fn beyond_an_edge_a_prediction_is_that_at_the_edge() {
 
 #[test]
 fn the_distance_from_the_data_is_told_in_standard_deviations() {
-    let x = array![[0.0, 5.0, 1.0], [2.0, 7.0, 1.0]];
-    let model = ElmParams::new(4).fit(&x, &array![0.0, 1.0]).unwrap();
-    // Deviations are 1, 1, and none.
+    let x = array![[0.0, 5.0, 1.0], [1.0, 6.0, 1.0], [2.0, 7.0, 1.0]];
+    let model = ElmParams::new(4).fit(&x, &array![0.0, 1.0, 1.0]).unwrap();
+    // Deviations are twice the root of 2 / 3, and none.
     let rows = array![[1.0, 6.0, 1.0], [5.0, 6.0, 1.0], [-3.0, 11.0, 7.0]];
     let distance = model.distance_outside(&rows).unwrap();
-    approx::assert_relative_eq!(distance, array![0.0, 3.0, 5.0], max_relative = 1e-14);
+    let expected = array![0.0, 3.0, 5.0] / (2.0_f64 / 3.0).sqrt();
+    approx::assert_relative_eq!(distance, expected, max_relative = 1e-14);
     let given = Elm::from_parts(
         model.scaler().cloned(),
         model.hidden().clone(),
