@@ -6,7 +6,9 @@
 //! [`ElmParams::bounded`](crate::ElmParams::bounded) is switched off, a fitted network therefore
 //!
 //! - takes each input that lies beyond its training range for the nearest end of that range, so that
-//!   a prediction outside is that at the edge of the data;
+//!   a prediction outside is that at the edge of the data. Of inputs that are drawn alike, the next
+//!   one lies a little beyond the largest so far, so the end is [`GAPS`] mean distance between
+//!   neighbouring values (at most [`WIDEST`] of the range) beyond the last;
 //! - keeps predictions within the range of the training targets, wider by [`MARGIN`] of it on
 //!   either side.
 //!
@@ -26,6 +28,14 @@ use crate::solve::{check_length, check_matrix};
 /// that range: rows between the training rows may well be higher than all of them.
 pub const MARGIN: f64 = 0.25;
 
+/// How far beyond the training range an input is taken as it is, in mean distances between
+/// neighbouring values, which are the range over the number of rows: rows that were held out from
+/// between the others lie at most about that far out.
+pub const GAPS: f64 = 1.0;
+
+/// The same at most, as a share of the range.
+pub const WIDEST: f64 = 0.05;
+
 /// The ranges of the training rows; see the [module](self).
 ///
 /// ```
@@ -36,14 +46,17 @@ pub const MARGIN: f64 = 0.25;
 /// let model = ElmParams::new(20).fit(&x, &x.mapv(f64::sin))?;
 /// let bounds = model.bounds().ok_or("a fitted network has them")?;
 /// assert_eq!(bounds.inputs().0, array![-3.0]);
+/// assert_eq!(bounds.held_inputs().1, array![3.0 + 0.05 * 6.0]);
 /// assert!((bounds.predictions().1[0] - 1.5).abs() < 1e-2);
 /// // Far outside, a prediction is that at the edge.
-/// assert_eq!(model.predict(&array![[1e6]])?, model.predict(&array![[3.0]])?);
+/// assert_eq!(model.predict(&array![[1e6]])?, model.predict(&array![[3.3]])?);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "", try_from = "Parts<A>")]
 pub struct Bounds<A: Scalar> {
+    /// Rows that these are of.
+    rows: u64,
     inputs: Ranges<A>,
     targets: Ranges<A>,
     held: bool,
@@ -61,6 +74,7 @@ struct Ranges<A: Scalar> {
 #[derive(Deserialize)]
 #[serde(bound = "")]
 struct Parts<A: Scalar> {
+    rows: u64,
     inputs: Ranges<A>,
     targets: Ranges<A>,
     held: bool,
@@ -71,6 +85,7 @@ impl<A: Scalar> TryFrom<Parts<A>> for Bounds<A> {
 
     fn try_from(parts: Parts<A>) -> Result<Self> {
         let Parts {
+            rows,
             inputs,
             targets,
             held,
@@ -78,6 +93,7 @@ impl<A: Scalar> TryFrom<Parts<A>> for Bounds<A> {
         inputs.check("ranges of inputs")?;
         targets.check("ranges of targets")?;
         Ok(Self {
+            rows,
             inputs,
             targets,
             held,
@@ -109,6 +125,22 @@ impl<A: Scalar> Ranges<A> {
         self.upper.zip_mut_with(&other.upper, |a, &b| *a = a.max(b));
     }
 
+    /// The ends, farther out by a share of the range.
+    fn widened(&self, share: f64) -> (Array1<A>, Array1<A>) {
+        let share = A::from_f64(share);
+        // Each end by itself, as the range may be beyond the type's.
+        let beyond = |end: A, other: A| {
+            let wide = end + (end * share - other * share);
+            wide.max(-A::max_value()).min(A::max_value())
+        };
+        let of = |ends: &Array1<A>, others: &Array1<A>| {
+            Zip::from(ends)
+                .and(others)
+                .map_collect(|&end, &other| beyond(end, other))
+        };
+        (of(&self.lower, &self.upper), of(&self.upper, &self.lower))
+    }
+
     fn check(&self, what: &'static str) -> Result<()> {
         check_length(what, self.upper.len(), self.lower.len())?;
         for ends in [&self.lower, &self.upper] {
@@ -134,7 +166,10 @@ impl<A: Scalar> Bounds<A> {
         weights: Option<ArrayView1<'_, A>>,
         held: bool,
     ) -> Option<Self> {
+        let counted =
+            |weights: ArrayView1<'_, A>| weights.iter().filter(|w| **w > A::zero()).count();
         Some(Self {
+            rows: weights.map_or(x.nrows(), counted) as u64,
             inputs: Ranges::of(x, weights)?,
             targets: Ranges::of(t, weights)?,
             held,
@@ -143,6 +178,7 @@ impl<A: Scalar> Bounds<A> {
 
     /// Takes in the rows of others of as many inputs and outputs.
     pub(crate) fn widen(&mut self, other: &Self) {
+        self.rows = self.rows.saturating_add(other.rows);
         self.inputs.widen(&other.inputs);
         self.targets.widen(&other.targets);
     }
@@ -169,6 +205,14 @@ impl<A: Scalar> Bounds<A> {
         (self.inputs.lower.view(), self.inputs.upper.view())
     }
 
+    /// What inputs are held between: their ranges and [`GAPS`] mean distances between neighbouring
+    /// values, at most [`WIDEST`] of the range, on either side.
+    #[must_use]
+    pub fn held_inputs(&self) -> (Array1<A>, Array1<A>) {
+        let share = (GAPS / self.rows.max(1) as f64).min(WIDEST);
+        self.inputs.widened(share)
+    }
+
     /// The least and the greatest value of each output among the training rows.
     #[must_use]
     pub fn targets(&self) -> (ArrayView1<'_, A>, ArrayView1<'_, A>) {
@@ -179,19 +223,7 @@ impl<A: Scalar> Bounds<A> {
     /// either side.
     #[must_use]
     pub fn predictions(&self) -> (Array1<A>, Array1<A>) {
-        let margin = A::from_f64(MARGIN);
-        let Ranges { lower, upper } = &self.targets;
-        // Each end by itself, as the range may be beyond the type's.
-        let beyond = |end: A, other: A| {
-            let wide = end + (end * margin - other * margin);
-            wide.max(-A::max_value()).min(A::max_value())
-        };
-        let of = |ends: &Array1<A>, others: &Array1<A>| {
-            Zip::from(ends)
-                .and(others)
-                .map_collect(|&end, &other| beyond(end, other))
-        };
-        (of(lower, upper), of(upper, lower))
+        self.targets.widened(MARGIN)
     }
 
     /// Inputs, in place, each held to its range where they are held.
@@ -199,11 +231,11 @@ impl<A: Scalar> Bounds<A> {
         if !self.held {
             return;
         }
-        let Ranges { lower, upper } = &self.inputs;
+        let (lower, upper) = self.held_inputs();
         for mut row in x.rows_mut() {
             Zip::from(&mut row)
-                .and(lower)
-                .and(upper)
+                .and(&lower)
+                .and(&upper)
                 .for_each(|x, &lower, &upper| *x = x.max(lower).min(upper));
         }
     }

@@ -299,6 +299,21 @@ impl<A: Scalar> Elm<A> {
         }
     }
 
+    /// The slope of each output at each row along each input, as the network makes its inputs
+    /// (standardised, where that is on): one matrix (rows, inputs) for each output.
+    pub(crate) fn gradients(&self, x: &ArrayRef2<A>) -> impl Iterator<Item = Array2<A>> {
+        let neurons = self.hidden.neurons();
+        let x = self.layer_inputs(x);
+        self.beta.columns().into_iter().map(move |beta| {
+            let (own, links) = beta.split_at(Axis(0), neurons);
+            let mut gradient = self.hidden.gradient(x.view(), own);
+            if !links.is_empty() {
+                gradient += &links;
+            }
+            gradient
+        })
+    }
+
     /// The ranges of the training rows that predictions are held to; nothing for a network
     /// [of given parts](Self::from_parts).
     #[must_use]

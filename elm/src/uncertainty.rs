@@ -14,6 +14,13 @@
 //!   but that rows are exchangeable: an interval asked to cover $1 - \alpha$ covers at least
 //!   $1 - 2\alpha$ always, and about $1 - \alpha$ in practice.
 //!
+//! Outside the training rows neither knows how the function goes on. Both then add what it may change
+//! by between the edge of the data, where predictions are [held](crate::bounds), and the row: with
+//! $e_j$ the distance beyond the range of input $j$ and $g_j$ the slope of the network along it, at
+//! the edge or as a root mean square over the training rows, whichever is steeper, $r = (\sum_j g_j^2 e_j^2)^{1/2}$ as one more independent
+//! deviation, and $4r$ at either end of an interval. That is an assumption, that the function is no
+//! steeper outside than inside, and not a guarantee.
+//!
 //! Both take the random layer, its standardisation and $\lambda$ as given. Where the settings were
 //! chosen on the same rows, errors are a little larger than either says.
 //!
@@ -31,7 +38,7 @@
 //! # Ok::<(), elm::Error>(())
 //! ```
 
-use ndarray::{Array1, Array2, ArrayRef2, ArrayView2, Zip, s};
+use ndarray::{Array1, Array2, ArrayRef2, ArrayView2, Axis, Zip, s};
 
 use crate::error::{Error, Result};
 use crate::metrics::root_mean_squares;
@@ -70,6 +77,9 @@ pub struct UncertainElm<A: Scalar> {
     left_out: Array2<A>,
     /// Estimated standard deviation of the noise, per output.
     noise: Array1<A>,
+    /// Mean square slope of each output along each input of the layer over the training rows, shape
+    /// (inputs, outputs).
+    steepness: Array2<A>,
 }
 
 /// One of the networks whose mean is predicted.
@@ -208,6 +218,7 @@ impl<A: Scalar> UncertainElm<A> {
                 A::from_f64((stats::sum(products).max(0.0) / rows).sqrt())
             });
         Ok(Self {
+            steepness: steepness(&model, x),
             model,
             members,
             left_out,
@@ -268,6 +279,37 @@ impl<A: Scalar> UncertainElm<A> {
         &self.noise
     }
 
+    /// What each output may change by, as a root mean square, between the edge of the data and rows
+    /// that lie outside; 0 for rows inside.
+    fn change_outside(&self, x: &ArrayRef2<A>) -> Array2<A> {
+        let mut change = Array2::zeros((x.nrows(), self.model.outputs()));
+        let Some(bounds) = self.model.bounds() else {
+            return change;
+        };
+        let mut excess = bounds.excess(x);
+        if let Some(scaler) = self.model.scaler() {
+            excess *= &scaler.factor();
+        }
+        let outside = |row: &usize| excess.row(*row).iter().any(|e| *e > A::zero());
+        let outside: Vec<usize> = (0..x.nrows()).filter(outside).collect();
+        let rows = x.select(Axis(0), &outside);
+        let gradients = self.model.gradients(&rows);
+        let columns = change.columns_mut().into_iter();
+        let outputs = gradients.zip(self.steepness.columns()).zip(columns);
+        for ((gradient, steepness), mut change) in outputs {
+            for (slopes, &row) in gradient.rows().into_iter().zip(&outside) {
+                let squares = Zip::from(slopes)
+                    .and(steepness)
+                    .and(excess.row(row))
+                    .fold(A::zero(), |sum, &slope, &usual, &e| {
+                        sum + (slope * slope).max(usual) * e * e
+                    });
+                change[row] = squares.sqrt();
+            }
+        }
+        change
+    }
+
     /// The standard deviation of a new observation: shape (rows, inputs) to (rows, outputs). Of an
     /// ensemble an upper bound: its variance is taken to be the mean of the members' variances, as
     /// if they all erred alike.
@@ -285,7 +327,8 @@ impl<A: Scalar> UncertainElm<A> {
             let own = validator.posterior_spread(&hidden, &model.diagnosis().lambda);
             spread.scaled_add(share, &own);
         }
-        let deviation = spread.mapv_into(|s| (A::one() + s).sqrt()) * &self.noise;
+        let mut deviation = spread.mapv_into(|s| (A::one() + s).sqrt()) * &self.noise;
+        deviation.zip_mut_with(&self.change_outside(x), |d, &change| *d = d.hypot(change));
         finite(deviation)
     }
 
@@ -325,6 +368,7 @@ impl<A: Scalar> UncertainElm<A> {
             return Ok((low, high));
         }
         let share = A::from_f64(self.members.len() as f64).recip();
+        let change = self.change_outside(x);
         let mut ends = vec![A::zero(); rows];
         for (output, left_out) in self.left_out.columns().into_iter().enumerate() {
             for row in 0..x.nrows() {
@@ -337,6 +381,7 @@ impl<A: Scalar> UncertainElm<A> {
                     moves.scaled_add(share, &(pull * member.left_out.column(output)));
                 }
                 let centre = predicted[[row, output]];
+                let wider = A::from_f64(4.0) * change[[row, output]];
                 let mut end = |sign: A| {
                     for ((end, &e), &moved) in ends.iter_mut().zip(left_out).zip(&moves) {
                         *end = sign * (centre - moved) - e.abs();
@@ -344,7 +389,7 @@ impl<A: Scalar> UncertainElm<A> {
                     let (_, value, _) = ends.select_nth_unstable_by(outside - 1, |a, b| {
                         a.as_f64().total_cmp(&b.as_f64())
                     });
-                    sign * *value
+                    sign * (*value - wider)
                 };
                 low[[row, output]] = end(A::one());
                 high[[row, output]] = end(-A::one());
@@ -352,6 +397,21 @@ impl<A: Scalar> UncertainElm<A> {
         }
         Ok((low, high))
     }
+}
+
+/// The mean square slope of each output along each input, shape (inputs, outputs), over at most some
+/// thousand rows spread evenly.
+fn steepness<A: Scalar>(model: &Elm<A>, x: &ArrayRef2<A>) -> Array2<A> {
+    const ROWS: usize = 1000;
+    let rows = x
+        .slice(s![..;x.nrows().div_ceil(ROWS).max(1), ..])
+        .to_owned();
+    let mut steepness = Array2::zeros((model.inputs(), model.outputs()));
+    let count = A::from_f64(rows.nrows() as f64);
+    for (gradient, mut column) in model.gradients(&rows).zip(steepness.columns_mut()) {
+        column.assign(&gradient.map_axis(Axis(0), |slopes| slopes.dot(&slopes) / count));
+    }
+    steepness
 }
 
 fn finite<A: Scalar>(values: Array2<A>) -> Result<Array2<A>> {

@@ -1,5 +1,6 @@
 //! `ElmParams::auto` against the best of a dense grid that was chosen with the test rows in sight.
 
+pub mod outside;
 pub mod problems;
 
 use std::time::Instant;
@@ -91,7 +92,7 @@ fn base(neurons: usize, seed: u64) -> ElmParams<f64> {
 #[must_use]
 pub fn run(problem: &Problem, subject: Subject, seed: u64) -> Option<Record> {
     let (x, t) = problem.train(seed)?;
-    let (x_test, test) = problem.test(seed, TEST_ROWS)?;
+    let (x_test, test) = problem.test(seed, TEST_ROWS, 1.0)?;
     let start = Instant::now();
     let tuned = subject.tuner(seed).tune(&x, &t).ok()?;
     let seconds = start.elapsed().as_secs_f64();

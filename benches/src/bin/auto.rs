@@ -1,6 +1,7 @@
 //! How near `ElmParams::auto` comes to the best of a dense grid, problem by problem.
 //!
-//! `cargo run --release -p elm-benches --bin auto -- [--seeds N] [--only NAME] [--format table|json]`
+//! `cargo run --release -p elm-benches --bin auto -- [--seeds N] [--only NAME] [--outside]
+//! [--format table|json]`
 
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
@@ -8,7 +9,7 @@ use std::error::Error;
 
 use clap::{Parser, ValueEnum};
 use elm_benches::auto::problems::PROBLEMS;
-use elm_benches::auto::{Record, Subject, run};
+use elm_benches::auto::{Record, Subject, outside, run};
 
 /// Test error of the chosen settings over that of the best on a grid chosen with the test rows in
 /// sight.
@@ -26,6 +27,9 @@ struct Arguments {
     /// Only with settings chosen by `auto`, not with 200 neurons given.
     #[arg(long)]
     auto_only: bool,
+    /// How far off predictions and intervals are outside the training rows instead.
+    #[arg(long)]
+    outside: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -36,6 +40,9 @@ enum Format {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
+    if arguments.outside {
+        return outside(&arguments);
+    }
     let subjects: &[Subject] = if arguments.auto_only {
         &[Subject::Auto]
     } else {
@@ -67,6 +74,44 @@ fn main() -> Result<(), Box<dyn Error>> {
     if arguments.format == Format::Json {
         println!("{}", serde_json::to_string_pretty(&records)?);
     }
+    Ok(())
+}
+
+fn outside(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    let mut records = Vec::new();
+    for problem in PROBLEMS.iter().filter(|p| p.name.contains(&arguments.only)) {
+        for seed in 1..=arguments.seeds {
+            let run = outside::run(problem, seed);
+            records.push(run.ok_or_else(|| format!("{}: cannot be fitted", problem.name))?);
+        }
+    }
+    if arguments.format == Format::Json {
+        println!("{}", serde_json::to_string_pretty(&records)?);
+        return Ok(());
+    }
+    println!(
+        "| problem | rows outside at 1.2 | RMSE at 1, 1.2 | unbounded | coverage of 0.9 at 1, 1.2 | farthest at 3 |\n         |---|---|---|---|---|---|"
+    );
+    let runs = records.chunks(usize::try_from(arguments.seeds)?);
+    for runs in runs {
+        let mean = |of: &dyn Fn(&outside::Outside) -> f64| {
+            runs.iter().map(of).sum::<f64>() / runs.len() as f64
+        };
+        println!(
+            "| {} | {:.2} | {:.3}, {:.3} | {:.3}, {:.3} | {:.3}, {:.3} | {:.2} |",
+            runs[0].problem,
+            mean(&|r| r.outside),
+            mean(&|r| r.rmse[0]),
+            mean(&|r| r.rmse[1]),
+            mean(&|r| r.unbounded[0]),
+            mean(&|r| r.unbounded[1]),
+            mean(&|r| r.coverage[0]),
+            mean(&|r| r.coverage[1]),
+            runs.iter().fold(0.0, |m: f64, r| m.max(r.excess)),
+        );
+    }
+    let mean = records.iter().map(|r| r.coverage[1]).sum::<f64>() / records.len() as f64;
+    println!("\nMean coverage at 1.2 times the extent: {mean:.3}");
     Ok(())
 }
 

@@ -5,6 +5,7 @@
 
 mod distance;
 mod draw;
+mod gradient;
 #[cfg(test)]
 mod tests;
 

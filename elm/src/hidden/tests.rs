@@ -243,3 +243,32 @@ fn student_t_weights_have_their_variance_and_a_root_in_common() {
     assert_eq!(few.weights, layer.weights.slice(s![.., ..10]));
     assert_eq!(few.biases, layer.biases.slice(s![..10]));
 }
+
+#[test]
+fn gradients_are_those_of_the_weighted_sum() {
+    // Central differences of squares are exact.
+    let square = Activation::custom("square", |z: f64| z * z);
+    let layer = Plan {
+        groups: vec![
+            Neurons::new(4, square.clone()),
+            Neurons::new(5, square).kind(Kind::Radial).scale(0.3),
+        ],
+        input_scales: vec![1.0, 0.25],
+        ..plan(0, 5)
+    }
+    .draw(rows().view(), None);
+    // Away from the centres, which lie on rows.
+    let x = rows() + 3.0;
+    let beta = Array1::from_shape_fn(9, |k| (k as f64).cos());
+    let gradient = layer.gradient(x.view(), beta.view());
+    let step = 1e-3;
+    for input in 0..2 {
+        let moved = |by: f64| {
+            let mut x = x.clone();
+            x.column_mut(input).mapv_inplace(|x| x + by);
+            layer.forward(x.view()).dot(&beta)
+        };
+        let expected = (moved(step) - moved(-step)) / (2.0 * step);
+        approx::assert_relative_eq!(gradient.column(input), expected, max_relative = 1e-8);
+    }
+}

@@ -122,6 +122,10 @@ impl<A: Scalar> ElmParams<A> {
         self.groups().fold(0, add)
     }
 
+    pub(crate) fn links_directly(&self) -> bool {
+        self.direct_links
+    }
+
     pub(crate) fn get_seed(&self) -> u64 {
         self.seed
     }

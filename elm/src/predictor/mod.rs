@@ -85,8 +85,8 @@ impl<A: Scalar> Predictor<A> {
     pub(crate) fn new(model: &Elm<A>) -> Self {
         let held = model.bounds().filter(|bounds| bounds.are_held());
         let inputs = held.map(|bounds| {
-            let (lower, upper) = bounds.inputs();
-            lower.into_iter().copied().zip(upper.into_iter().copied())
+            let (lower, upper) = bounds.held_inputs();
+            lower.into_iter().zip(upper)
         });
         let outputs = held.map(|bounds| {
             let (least, greatest) = bounds.predictions();

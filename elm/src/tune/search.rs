@@ -18,6 +18,8 @@ const MODERATE: usize = 100;
 const WORTHWHILE: f64 = 0.01;
 /// Coarse steps of the scale: half a decade.
 const COARSE: f64 = 0.5;
+/// What a held-out error at a scale below the centre counts more for, for each decade.
+const PER_DECADE: f64 = 0.06;
 /// Steps of the scale below this (in decades) make no difference worth a factorisation.
 const FINEST: f64 = 0.1;
 /// Factorisations that are kept for choosing the number of neurons, where that is to be chosen.
@@ -32,12 +34,15 @@ struct Attempt {
     trial: Trial,
     /// Squared, relative to each output's variance, mean over outputs.
     squares: Vec<f64>,
+    /// What the score counts for, over what it is: above 1 for small scales.
+    price: f64,
 }
 
 impl Attempt {
     /// Whether the errors are smaller by more than so many standard errors of the difference.
     fn beats(&self, other: &Self, standard_errors: f64) -> bool {
-        if self.trial.score >= other.trial.score * (1.0 - WORTHWHILE) {
+        let priced = |attempt: &Self| attempt.trial.score * attempt.price;
+        if priced(self) >= priced(other) * (1.0 - WORTHWHILE) {
             return false;
         }
         let gains = || {
@@ -72,6 +77,8 @@ pub(super) struct Search<'a, A: Scalar> {
     limit: usize,
     /// Where doubling ends.
     most: usize,
+    /// Whether inputs reach the outputs directly where the search stands.
+    links: bool,
 }
 
 impl<'a, A: Scalar> Search<'a, A> {
@@ -109,6 +116,7 @@ impl<'a, A: Scalar> Search<'a, A> {
             spent: 0,
             limit: tuner.budget,
             most,
+            links: tuner.base.links_directly(),
         })
     }
 
@@ -136,6 +144,9 @@ impl<'a, A: Scalar> Search<'a, A> {
             self.move_if(neurons, exponent, &[], scale_pays)?;
         }
         self.refine_scale(COARSE / 2.0, FINEST)?;
+        if self.tuner.try_links && !self.links {
+            self.link()?;
+        }
         if self.tuner.per_input && self.x.ncols() > 1 {
             self.follow_slopes()?;
             self.choose_input_scales()?;
@@ -144,6 +155,18 @@ impl<'a, A: Scalar> Search<'a, A> {
         if self.tuner.neurons.is_none() {
             self.choose_neurons(most)?;
         }
+        Ok(())
+    }
+
+    /// Links the inputs directly if that pays: what is linear in many inputs, or in columns of zeros
+    /// and ones, a layer of some hundred neurons carries badly.
+    fn link(&mut self) -> Result<()> {
+        let Some(now) = self.now() else {
+            return Ok(());
+        };
+        self.links = true;
+        let exponent = now.scale.log10();
+        self.links = self.move_if(now.neurons, exponent, &now.input_scales, links_pay)?;
         Ok(())
     }
 
@@ -211,35 +234,20 @@ impl<'a, A: Scalar> Search<'a, A> {
     /// For each input the root mean square slope of the trial's network along it, in what the network
     /// makes of the input; nothing where there are none.
     fn slopes(&mut self, trial: &Trial) -> Result<Option<Vec<f64>>> {
-        // A quarter of a deviation: what matters at the scale of the data, not of the wiggles.
-        const STEP: f64 = 0.25;
         self.spent += 1;
         let model = self.tuner.params(trial).fit(&self.x, &self.t)?;
         let every = self.x.nrows().div_ceil(SLOPE_ROWS).max(1);
         let rows = self.x.slice(ndarray::s![..;every, ..]).to_owned();
-        let standardises = model.scaler().is_some();
-        let mut slopes = Vec::with_capacity(self.x.ncols());
-        for (input, column) in self.x.columns().into_iter().enumerate() {
-            let unit = deviation(column);
-            let moved = |by: f64| {
-                let mut rows = rows.clone();
-                rows.column_mut(input)
-                    .mapv_inplace(|x| x + A::from_f64(by * unit));
-                model.predict(&rows)
-            };
-            let (Ok(up), Ok(down)) = (moved(STEP), moved(-STEP)) else {
-                // Beyond the range of the type.
-                return Ok(None);
-            };
-            let mut squares = 0.0;
-            for (change, spread) in (up - down).columns().into_iter().zip(&self.spread) {
-                squares += change
+        let mut squares = vec![0.0; self.x.ncols()];
+        for (gradient, spread) in model.gradients(&rows).zip(&self.spread) {
+            for (square, slopes) in squares.iter_mut().zip(gradient.columns()) {
+                *square += slopes
                     .iter()
-                    .map(|c| (c.as_f64() / spread).powi(2))
+                    .map(|slope| (slope.as_f64() / spread).powi(2))
                     .sum::<f64>();
             }
-            slopes.push(squares.sqrt() / if standardises { 1.0 } else { unit });
         }
+        let slopes: Vec<f64> = squares.into_iter().map(f64::sqrt).collect();
         let usable = slopes.iter().all(|s| s.is_finite()) && slopes.iter().any(|s| *s > 0.0);
         Ok(usable.then_some(slopes))
     }
@@ -270,6 +278,10 @@ impl<'a, A: Scalar> Search<'a, A> {
     /// Coordinate by coordinate, by a factor that shrinks once no input moves.
     fn choose_input_scales(&mut self) -> Result<()> {
         let caution = self.caution();
+        // Where not even each input can be tried once, the first ones would have all of the trials.
+        if self.x.ncols() > self.limit.saturating_sub(self.spent) {
+            return Ok(());
+        }
         let mut step = 2.0 * COARSE;
         while step >= FINEST && !self.is_spent() {
             let mut moved = false;
@@ -335,11 +347,19 @@ impl<'a, A: Scalar> Search<'a, A> {
         Ok(moves)
     }
 
+    /// What a score counts for at a scale, over what it is: small scales make networks that are
+    /// nearly polynomials, with large output weights that cancel among the rows and nowhere else.
+    fn price(&self, scale: f64) -> f64 {
+        let centre = (self.exponents.0 + self.exponents.1) / 2.0;
+        (1.0 + PER_DECADE).powf((centre - scale.log10()).max(0.0))
+    }
+
     fn attempt(&self, neurons: usize, scale: f64, scales: &[f64]) -> Result<Attempt> {
         let mut trial = Trial {
             neurons,
             scale,
             input_scales: scales.to_vec(),
+            direct_links: self.links,
             score: f64::INFINITY,
         };
         let params = self.tuner.params(&trial).check()?;
@@ -356,6 +376,7 @@ impl<'a, A: Scalar> Search<'a, A> {
                 return Ok(Attempt {
                     trial,
                     squares: Vec::new(),
+                    price: 1.0,
                 });
             }
             Err(error) => return Err(error),
@@ -374,7 +395,12 @@ impl<'a, A: Scalar> Search<'a, A> {
             })
             .collect();
         trial.score = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
-        Ok(Attempt { trial, squares })
+        let price = self.price(scale);
+        Ok(Attempt {
+            trial,
+            squares,
+            price,
+        })
     }
 }
 
@@ -386,6 +412,10 @@ fn scale_pays(new: &Attempt, old: &Attempt) -> bool {
 
 fn neurons_pay(new: &Attempt, old: &Attempt) -> bool {
     new.beats(old, 1.0)
+}
+
+fn links_pay(new: &Attempt, old: &Attempt) -> bool {
+    new.beats(old, 0.5)
 }
 
 fn step_pays(new: &Attempt, old: &Attempt) -> bool {

@@ -78,7 +78,11 @@ fn beyond_an_edge_a_prediction_is_that_at_the_edge() {
     let t = array![[0.0, 1.0], [1.0, 4.0], [0.5, 2.0], [2.0, 2.0], [1.0, 0.0]];
     let model = ElmParams::new(12).fit(&x, &t).unwrap();
     let outside = array![[-7.0, 6.0], [1.0, 1e9], [4.0, -1e9]];
-    let edge = array![[0.0, 6.0], [1.0, 9.0], [3.0, 5.0]];
+    // A twentieth of the range beyond the last values, as the rows are few.
+    let (lower, upper) = model.bounds().unwrap().held_inputs();
+    approx::assert_relative_eq!(lower, array![-0.15, 4.8], max_relative = 1e-14);
+    approx::assert_relative_eq!(upper, array![3.15, 9.2], max_relative = 1e-14);
+    let edge = array![[lower[0], 6.0], [1.0, upper[1]], [upper[0], lower[1]]];
     let at_edge = model.predict(&edge).unwrap();
     assert_eq!(model.predict(&outside).unwrap(), at_edge);
     let predictor = model.predictor();
