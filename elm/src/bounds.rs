@@ -7,8 +7,7 @@
 //!
 //! - takes each input that lies beyond its training range for the nearest end of that range, so that
 //!   a prediction outside is that at the edge of the data. Of inputs that are drawn alike, the next
-//!   one lies a little beyond the largest so far, so the end is [`GAPS`] mean distance between
-//!   neighbouring values (at most [`WIDEST`] of the range) beyond the last;
+//!   one lies a little beyond the largest so far, so the edge is [`EDGE`] of the range farther out;
 //! - keeps predictions within the range of the training targets, wider by [`MARGIN`] of it on
 //!   either side.
 //!
@@ -28,13 +27,9 @@ use crate::solve::{check_length, check_matrix};
 /// that range: rows between the training rows may well be higher than all of them.
 pub const MARGIN: f64 = 0.25;
 
-/// How far beyond the training range an input is taken as it is, in mean distances between
-/// neighbouring values, which are the range over the number of rows: rows that were held out from
-/// between the others lie at most about that far out.
-pub const GAPS: f64 = 1.0;
-
-/// The same at most, as a share of the range.
-pub const WIDEST: f64 = 0.05;
+/// How far beyond the training range an input is taken as it is, as a share of that range: rows that
+/// were held out from between the others lie a little beyond the last of them.
+pub const EDGE: f64 = 0.005;
 
 /// The ranges of the training rows; see the [module](self).
 ///
@@ -46,17 +41,15 @@ pub const WIDEST: f64 = 0.05;
 /// let model = ElmParams::new(20).fit(&x, &x.mapv(f64::sin))?;
 /// let bounds = model.bounds().ok_or("a fitted network has them")?;
 /// assert_eq!(bounds.inputs().0, array![-3.0]);
-/// assert_eq!(bounds.held_inputs().1, array![3.0 + 0.05 * 6.0]);
+/// assert_eq!(bounds.held_inputs().1, array![3.0 + 0.005 * 6.0]);
 /// assert!((bounds.predictions().1[0] - 1.5).abs() < 1e-2);
 /// // Far outside, a prediction is that at the edge.
-/// assert_eq!(model.predict(&array![[1e6]])?, model.predict(&array![[3.3]])?);
+/// assert_eq!(model.predict(&array![[1e6]])?, model.predict(&array![[3.03]])?);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "", try_from = "Parts<A>")]
 pub struct Bounds<A: Scalar> {
-    /// Rows that these are of.
-    rows: u64,
     inputs: Ranges<A>,
     targets: Ranges<A>,
     held: bool,
@@ -74,7 +67,6 @@ struct Ranges<A: Scalar> {
 #[derive(Deserialize)]
 #[serde(bound = "")]
 struct Parts<A: Scalar> {
-    rows: u64,
     inputs: Ranges<A>,
     targets: Ranges<A>,
     held: bool,
@@ -85,7 +77,6 @@ impl<A: Scalar> TryFrom<Parts<A>> for Bounds<A> {
 
     fn try_from(parts: Parts<A>) -> Result<Self> {
         let Parts {
-            rows,
             inputs,
             targets,
             held,
@@ -93,7 +84,6 @@ impl<A: Scalar> TryFrom<Parts<A>> for Bounds<A> {
         inputs.check("ranges of inputs")?;
         targets.check("ranges of targets")?;
         Ok(Self {
-            rows,
             inputs,
             targets,
             held,
@@ -169,7 +159,6 @@ impl<A: Scalar> Bounds<A> {
         let counted =
             |weights: ArrayView1<'_, A>| weights.iter().filter(|w| **w > A::zero()).count();
         Some(Self {
-            rows: weights.map_or(x.nrows(), counted) as u64,
             inputs: Ranges::of(x, weights)?,
             targets: Ranges::of(t, weights)?,
             held,
@@ -178,7 +167,6 @@ impl<A: Scalar> Bounds<A> {
 
     /// Takes in the rows of others of as many inputs and outputs.
     pub(crate) fn widen(&mut self, other: &Self) {
-        self.rows = self.rows.saturating_add(other.rows);
         self.inputs.widen(&other.inputs);
         self.targets.widen(&other.targets);
     }
@@ -205,12 +193,10 @@ impl<A: Scalar> Bounds<A> {
         (self.inputs.lower.view(), self.inputs.upper.view())
     }
 
-    /// What inputs are held between: their ranges and [`GAPS`] mean distances between neighbouring
-    /// values, at most [`WIDEST`] of the range, on either side.
+    /// What inputs are held between: their ranges and [`EDGE`] of them on either side.
     #[must_use]
     pub fn held_inputs(&self) -> (Array1<A>, Array1<A>) {
-        let share = (GAPS / self.rows.max(1) as f64).min(WIDEST);
-        self.inputs.widened(share)
+        self.inputs.widened(EDGE)
     }
 
     /// The least and the greatest value of each output among the training rows.

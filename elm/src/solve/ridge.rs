@@ -19,11 +19,12 @@ use crate::scalar::Scalar;
 pub enum Lambda {
     /// This value, positive and finite.
     Relative(f64),
-    /// The value with the smallest exact leave-one-out error (Allen's PRESS, 1974).
+    /// The value with the smallest exact leave-one-out error (Allen's PRESS, 1974), or the strongest
+    /// whose squared error is within 1 % of that.
     #[default]
     LeaveOneOut,
-    /// The value with the smallest generalised cross-validation score (Golub, Heath and Wahba,
-    /// 1979): cheaper than leave-one-out as it does not visit the rows.
+    /// The same by the generalised cross-validation score (Golub, Heath and Wahba, 1979): cheaper than
+    /// leave-one-out as it does not visit the rows.
     Gcv,
 }
 
@@ -259,29 +260,29 @@ impl Ridge {
             .unzip()
     }
 
-    /// The index of the strongest candidate whose score is as good as the smallest finite one, to
-    /// within [`TOLERANCE`].
-    pub(crate) fn best(scores: ArrayView1<'_, f64>) -> usize {
+    /// The index of the last score that exceeds the smallest finite one by no more than this share.
+    pub(crate) fn last_within(scores: ArrayView1<'_, f64>, tolerance: f64) -> usize {
         let smallest = scores.iter().copied().fold(f64::INFINITY, f64::min);
-        let bound = smallest * (1.0 + TOLERANCE);
+        let bound = smallest * (1.0 + tolerance);
         scores
             .iter()
             .rposition(|&score| score <= bound)
             .unwrap_or(scores.len() - 1)
     }
 
-    /// For each output the index of the best candidate. Of equals the strongest wins, so that a
-    /// flat score never means an unregularised fit.
+    /// For each output the index of the strongest candidate that is as good as the best, to within
+    /// [`TOLERANCE`], so that a flat score never means an unregularised fit.
     fn choose<A: Scalar>(self, spectrum: &Spectrum<A>, scores: &Array2<f64>) -> Vec<usize> {
         let outputs = scores.ncols();
         if !self.shared {
-            return scores.columns().into_iter().map(Self::best).collect();
+            let strongest = |scores| Self::last_within(scores, TOLERANCE);
+            return scores.columns().into_iter().map(strongest).collect();
         }
         let variance = spectrum
             .total_squares()
             .mapv(|v| if v > A::zero() { v.as_f64() } else { 1.0 });
         let mean = (scores / &variance).sum_axis(Axis(1));
-        vec![Self::best(mean.view()); outputs]
+        vec![Self::last_within(mean.view(), TOLERANCE); outputs]
     }
 }
 

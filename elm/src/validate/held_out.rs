@@ -76,6 +76,9 @@ pub struct Path {
     pub(super) scale: Array1<f64>,
 }
 
+/// Scores that differ by rounding alone.
+const EQUAL: f64 = 1e-9;
+
 impl Path {
     /// The relative strengths, as they were asked for.
     #[must_use]
@@ -96,7 +99,7 @@ impl Path {
         self.rmse
             .columns()
             .into_iter()
-            .map(|scores| self.lambdas[Ridge::best(scores)])
+            .map(|scores| self.lambdas[Ridge::last_within(scores, EQUAL)])
             .collect()
     }
 
@@ -105,6 +108,6 @@ impl Path {
     #[must_use]
     pub fn best_shared(&self) -> f64 {
         let relative = &self.rmse / &self.scale;
-        self.lambdas[Ridge::best(relative.mapv(|r| r * r).sum_axis(Axis(1)).view())]
+        self.lambdas[Ridge::last_within(relative.mapv(|r| r * r).sum_axis(Axis(1)).view(), EQUAL)]
     }
 }

@@ -78,10 +78,10 @@ fn beyond_an_edge_a_prediction_is_that_at_the_edge() {
     let t = array![[0.0, 1.0], [1.0, 4.0], [0.5, 2.0], [2.0, 2.0], [1.0, 0.0]];
     let model = ElmParams::new(12).fit(&x, &t).unwrap();
     let outside = array![[-7.0, 6.0], [1.0, 1e9], [4.0, -1e9]];
-    // A twentieth of the range beyond the last values, as the rows are few.
+    // A two-hundredth of the range beyond the last values.
     let (lower, upper) = model.bounds().unwrap().held_inputs();
-    approx::assert_relative_eq!(lower, array![-0.15, 4.8], max_relative = 1e-14);
-    approx::assert_relative_eq!(upper, array![3.15, 9.2], max_relative = 1e-14);
+    approx::assert_relative_eq!(lower, array![-0.015, 4.98], max_relative = 1e-14);
+    approx::assert_relative_eq!(upper, array![3.015, 9.02], max_relative = 1e-14);
     let edge = array![[lower[0], 6.0], [1.0, upper[1]], [upper[0], lower[1]]];
     let at_edge = model.predict(&edge).unwrap();
     assert_eq!(model.predict(&outside).unwrap(), at_edge);
@@ -196,5 +196,62 @@ fn a_skewed_input_just_beyond_its_largest_value_is_predicted_sanely() {
                 "draw {draw}: {y} for {truth}"
             );
         }
+    }
+}
+
+#[test]
+fn intervals_and_deviations_widen_outside_the_data() {
+    let (mut covered, mut rows) = (0, 0);
+    for seed in 0..6 {
+        let (x, t) = noisy_wave(200, 20 + 2 * seed);
+        let model = ElmParams::new(60).fit_uncertain(&x, &t).unwrap();
+        let mut test = noisy_wave(500, 90 + 2 * seed);
+        let noise = test.1 - wave(&test.0);
+        test.0 *= 1.2;
+        let observed = wave(&test.0) + noise;
+        let (low, high) = model.predict_interval(&test.0, 0.9).unwrap();
+        rows += observed.len();
+        covered += observed
+            .iter()
+            .zip(low.column(0))
+            .zip(high.column(0))
+            .filter(|((t, low), high)| low <= t && t <= high)
+            .count();
+        // Along a line outwards both grow with the distance.
+        let line =
+            Array2::from_shape_fn((4, 3), |(i, j)| if j == 0 { 1.0 + i as f64 } else { 0.0 });
+        let deviation = model.predict_deviation(&line).unwrap();
+        let (low, high) = model.predict_interval(&line, 0.9).unwrap();
+        let width = high - low;
+        for i in 1..4 {
+            assert!(deviation[[i, 0]] > deviation[[i - 1, 0]]);
+            assert!(width[[i, 0]] > width[[i - 1, 0]]);
+        }
+    }
+    let share = covered as f64 / rows as f64;
+    assert!(share > 0.9, "{share}");
+}
+
+#[test]
+fn leave_one_out_of_skewed_inputs_has_bounded_output_weights() {
+    // Of strengths with equally good errors the strongest: never weaker than by the smallest error.
+    for draw in 0..10 {
+        let z = normal::<f64>(176, 2, 200 + draw);
+        let x = z.slice(s![.., ..1]).mapv(|z| (6.8 + 0.45 * z).exp());
+        let t = x.column(0).mapv(|x| 80.0 + x / 2.0) + 0.06 * &x.column(0) * &z.column(1);
+        let params = ElmParams::new(100).check().unwrap();
+        let model = params.fit(&x, &t).unwrap();
+        let hidden = model.hidden_matrix(&x).unwrap();
+        let targets = t.insert_axis(Axis(1));
+        let problem = elm::solve::LeastSquares::new(&hidden, &targets).unwrap();
+        let validator = elm::validate::Validator::new(&problem.intercept(true)).unwrap();
+        let path = validator.leave_one_out_path(&Ridge::candidates()).unwrap();
+        let scores = path.rmse().column(0).to_owned();
+        let smallest = scores.iter().copied().fold(f64::INFINITY, f64::min);
+        let found = model.diagnosis().leave_one_out.as_ref().unwrap()[0];
+        assert!(
+            found <= smallest * 1.01_f64.sqrt() * (1.0 + 1e-6),
+            "{found} {smallest}"
+        );
     }
 }

@@ -354,7 +354,7 @@ fn the_leave_one_out_score_is_that_of_refitting_without_each_row() {
 }
 
 #[test]
-fn gcv_chooses_the_smallest_score_of_its_definition() {
+fn gcv_chooses_the_strongest_whose_score_is_within_a_hundredth_of_the_smallest() {
     for (name, problem) in problems::<f64>() {
         let rows = problem
             .weights
@@ -379,13 +379,24 @@ fn gcv_chooses_the_smallest_score_of_its_definition() {
                 (score, 8.0 * rows * f64::EPSILON * (1.0 + fast) / spare)
             };
             let (score_of_chosen, error) = score(chosen);
-            for step in -40..=8 {
-                let (score, other_error) = score(10.0_f64.powf(f64::from(step) / 4.0));
+            let others = (-40..=8).map(|step| 10.0_f64.powf(f64::from(step) / 4.0));
+            let others: Vec<_> = others.map(|lambda| (lambda, score(lambda))).collect();
+            for &(_, (score, other_error)) in &others {
                 let slack = 1e-9 + error + other_error;
                 assert!(
-                    score_of_chosen <= score * (1.0 + slack),
+                    score_of_chosen <= 1.01 * score * (1.0 + slack),
                     "{name}: {chosen:e}"
                 );
+            }
+            // Every stronger one is worse than that.
+            let smallest = others
+                .iter()
+                .fold(f64::INFINITY, |m, (_, (score, _))| m.min(*score));
+            for &(lambda, (score, error)) in &others {
+                if lambda > chosen * 1.1 {
+                    let least = 1.01 * smallest * (1.0 - 1e-9 - error);
+                    assert!(score >= least, "{name}: {lambda:e} for {chosen:e}");
+                }
             }
         }
     }
