@@ -156,8 +156,6 @@ impl<A: Scalar> Bounds<A> {
         weights: Option<ArrayView1<'_, A>>,
         held: bool,
     ) -> Option<Self> {
-        let counted =
-            |weights: ArrayView1<'_, A>| weights.iter().filter(|w| **w > A::zero()).count();
         Some(Self {
             inputs: Ranges::of(x, weights)?,
             targets: Ranges::of(t, weights)?,
