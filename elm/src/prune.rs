@@ -56,19 +56,19 @@
 //! against the function itself rose from 0.74 to 1.11 (example `prune`), which with the noise is 20 %.
 //! Judge the result on rows that were held back.
 
-use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis, concatenate, s};
+mod fit;
+
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, concatenate, s};
 use serde::{Deserialize, Serialize};
 
-use crate::bounds::Bounds;
 use crate::error::{Error, Result};
 use crate::linalg::{Kernel, Symmetric, Triangular};
-use crate::model::{CheckedParams, Drawn, ElmParams, Rows, Targets};
 use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::solve::frame::{Frame, Prepared};
 use crate::solve::lanczos::largest_eigenvalue;
 use crate::solve::spectrum::Spectrum;
-use crate::solve::{Lambda, LeastSquares, Ridge, Solver};
+use crate::solve::{Lambda, LeastSquares, Ridge};
 
 /// How much of a layer stays.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -102,98 +102,6 @@ pub struct Pruned<A: Scalar> {
     /// The sizes that were looked at, the smallest first: from 1 to all for [`Keep::Loss`], the one
     /// asked for for [`Keep::Neurons`].
     pub path: Vec<Size>,
-}
-
-impl<A: Scalar> ElmParams<A> {
-    /// Draws the layer, keeps the neurons that are most useful together, and fits them; see
-    /// [`prune`](crate::prune).
-    ///
-    /// # Errors
-    /// Those of [`check`](Self::check) and [`CheckedParams::fit_pruned`].
-    pub fn fit_pruned<T: Targets<A>>(
-        &self,
-        x: &ArrayRef2<A>,
-        t: &T,
-        keep: Keep,
-    ) -> Result<Pruned<A>> {
-        self.clone().check()?.fit_pruned(x, t, keep)
-    }
-}
-
-impl<A: Scalar> CheckedParams<A> {
-    /// Draws the layer, keeps the neurons that are most useful together, and fits them; see
-    /// [`prune`](crate::prune). Direct links are kept.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] for more neurons than there are, none, or a loss that is negative or
-    /// not finite; [`Error::Conflict`] unless the solver is ridge; those of [`fit`](Self::fit).
-    pub fn fit_pruned<T: Targets<A>>(
-        &self,
-        x: &ArrayRef2<A>,
-        t: &T,
-        keep: Keep,
-    ) -> Result<Pruned<A>> {
-        self.fit_pruned_weighted(x, t, keep, None)
-    }
-
-    /// As [`fit_pruned`](Self::fit_pruned), with a weight for the squared residual of each row, which
-    /// decides what is useful as well, and counts in all else as in
-    /// [`fit_weighted`](Self::fit_weighted).
-    ///
-    /// # Errors
-    /// Those of [`fit_pruned`](Self::fit_pruned) and [`LeastSquares::weights`].
-    pub fn fit_pruned_weighted<T: Targets<A>>(
-        &self,
-        x: &ArrayRef2<A>,
-        t: &T,
-        keep: Keep,
-        weights: Option<ArrayView1<'_, A>>,
-    ) -> Result<Pruned<A>> {
-        let Solver::Ridge(ridge) = self.solver() else {
-            return Err(Error::Conflict {
-                first: "a solver other than ridge",
-                second: "pruning",
-            });
-        };
-        keep.check(self.params().neurons())?;
-        let rows = Rows::new(x.view(), t.as_matrix(), weights)?;
-        let (t, weights) = (rows.t(), rows.weights());
-        let Drawn {
-            scaler,
-            hidden,
-            design,
-        } = self.draw(&rows)?;
-        let wide = (A::widen(design.view()), A::widen(t));
-        let wide_weights = weights.map(A::widen);
-        let mut problem = LeastSquares::of_views(wide.0.view(), wide.1.view())?;
-        if let Some(weights) = &wide_weights {
-            problem = problem.weights(weights)?;
-        }
-        let problem = problem.intercept(self.has_intercept());
-        let (mut kept, path) = choose(&problem, hidden.neurons(), ridge, keep)?;
-        kept.sort_unstable();
-
-        let columns: Vec<usize> = kept
-            .iter()
-            .copied()
-            .chain(hidden.neurons()..design.ncols())
-            .collect();
-        let design = design.select(Axis(1), &columns);
-        let solution = self
-            .solver()
-            .solve(&self.problem(&design, t, weights.as_ref())?)?;
-        Ok(Pruned {
-            model: Elm::assemble(
-                scaler,
-                hidden.select(&kept),
-                self.links_directly(),
-                solution,
-                Bounds::of(rows.x(), t, weights, self.is_bounded()),
-            ),
-            kept,
-            path,
-        })
-    }
 }
 
 impl Keep {

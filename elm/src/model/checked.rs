@@ -99,13 +99,27 @@ impl<A: Scalar> CheckedParams<A> {
         t: &T,
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<Elm<A>> {
-        let rows = Rows::new(x.view(), t.as_matrix(), weights)?;
-        check_size(rows.x(), hidden.neurons())?;
+        let t = t.as_matrix();
+        let rows = self.rows_of_layer(scaler.as_ref(), &hidden, x.view(), t, weights)?;
+        self.output_weights(scaler, hidden, &rows)
+    }
+
+    /// Checks that rows, a layer that is there already and its scaler go together.
+    pub(crate) fn rows_of_layer<'a>(
+        &self,
+        scaler: Option<&Scaler<A>>,
+        hidden: &HiddenLayer<A>,
+        x: ArrayView2<'a, A>,
+        t: ArrayView2<'a, A>,
+        weights: Option<ArrayView1<'a, A>>,
+    ) -> Result<Rows<'a, A>> {
+        let rows = Rows::new(x, t, weights)?;
+        check_size(x, hidden.neurons())?;
         check_length("inputs of the layer", hidden.inputs(), x.ncols())?;
-        if let Some(scaler) = &scaler {
+        if let Some(scaler) = scaler {
             check_length("inputs of the scaler", scaler.mean().len(), x.ncols())?;
         }
-        self.output_weights(scaler, hidden, &rows)
+        Ok(rows)
     }
 
     /// The solution for a layer and data that go together.
@@ -255,7 +269,7 @@ impl<A: Scalar> CheckedParams<A> {
     }
 
     /// The hidden-layer matrix, with the inputs beside it where they are linked directly.
-    fn design(
+    pub(crate) fn design(
         &self,
         x: ArrayView2<'_, A>,
         scaler: Option<&Scaler<A>>,

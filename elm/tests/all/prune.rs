@@ -289,6 +289,9 @@ fn a_layer_that_is_there_already_is_fitted_as_when_it_was_drawn() {
         let given = checked.fit_layer(scaler.clone(), layer.clone(), &x, &t, None);
         let difference = given.unwrap().predict(&x).unwrap() - drawn.predict(&x).unwrap();
         assert!(difference.iter().all(|d| d.abs() < 1e-9));
+        let keep = Keep::Neurons(9);
+        let given = checked.prune_layer(scaler.clone(), layer.clone(), &x, &t, keep, None);
+        assert_eq!(given.unwrap(), checked.fit_pruned(&x, &t, keep).unwrap());
 
         let narrow = Scaler::measured(&x.slice(s![.., ..2])).unwrap();
         for (scaler, layer, t) in [
@@ -296,7 +299,9 @@ fn a_layer_that_is_there_already_is_fitted_as_when_it_was_drawn() {
             (scaler, layer.clone(), &t.slice(s![..9]).to_owned()),
             (Some(narrow), layer, &t),
         ] {
-            let refused = checked.fit_layer(scaler, layer, &x, t, None);
+            let refused = checked.fit_layer(scaler.clone(), layer.clone(), &x, t, None);
+            assert!(matches!(refused, Err(Error::Shape { .. })), "{refused:?}");
+            let refused = checked.prune_layer(scaler, layer, &x, t, Keep::Neurons(2), None);
             assert!(matches!(refused, Err(Error::Shape { .. })), "{refused:?}");
         }
     }

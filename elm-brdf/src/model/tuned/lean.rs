@@ -233,7 +233,14 @@ impl Search<'_> {
         let weights = self.weights.as_ref().map(|weights| weights.view());
         if drawn > neurons {
             let keep = Keep::Neurons(neurons);
-            let pruned = params.fit_pruned_weighted(&self.x, &self.targets, keep, weights)?;
+            let pruned = params.prune_layer(
+                Some(self.scaler.clone()),
+                blank.network.hidden().clone(),
+                &self.x,
+                &self.targets,
+                keep,
+                weights,
+            )?;
             let mut kept = vec![false; drawn];
             for &number in &pruned.kept {
                 kept[number] = true;

@@ -63,7 +63,9 @@ pub(super) fn fit(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) ->
     let params = params.solver(Ridge::relative(RIDGE)).check()?;
     let weights = row_weights(tuned.metric, pairs, values, &link);
     let few_weights = weights.as_ref().map(|weights| weights.select(Axis(0), few));
-    let pruned = params.fit_pruned_weighted(
+    let pruned = params.prune_layer(
+        Some(scaler.clone()),
+        blank.network.hidden().clone(),
         &x.select(Axis(0), few),
         &targets.select(Axis(0), few),
         Keep::Neurons(neurons),
