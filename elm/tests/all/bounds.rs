@@ -238,7 +238,7 @@ fn leave_one_out_of_skewed_inputs_has_bounded_output_weights() {
     for draw in 0..10 {
         let z = normal::<f64>(176, 2, 200 + draw);
         let x = z.slice(s![.., ..1]).mapv(|z| (6.8 + 0.45 * z).exp());
-        let t = x.column(0).mapv(|x| 80.0 + x / 2.0) + 0.06 * &x.column(0) * &z.column(1);
+        let t = x.column(0).mapv(|x| 80.0 + x / 2.0) + 0.06 * &x.column(0) * z.column(1);
         let params = ElmParams::new(100).check().unwrap();
         let model = params.fit(&x, &t).unwrap();
         let hidden = model.hidden_matrix(&x).unwrap();
