@@ -42,11 +42,14 @@ pub enum Features {
     /// numbers, which is as many as a reciprocal isotropic material depends on, and from directions by
     /// arithmetic and two square roots. Reciprocal.
     Algebraic,
+    /// $\sqrt{\theta_h}$, $\cos\theta_d$, $\cos\theta_i$ and $\cos\theta_o$: spreads out the
+    /// highlight as [`Highlight`](Self::Highlight) does, and tells light from viewer.
+    HighlightCosines,
 }
 
 impl Features {
     /// Every set there is.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Paper,
         Self::HalfDiff,
         Self::Cosines,
@@ -54,6 +57,7 @@ impl Features {
         Self::ReciprocalCosines,
         Self::Highlight,
         Self::Algebraic,
+        Self::HighlightCosines,
     ];
 
     /// The set's name.
@@ -66,6 +70,7 @@ impl Features {
             Self::SumDifference => "sum-difference",
             Self::ReciprocalCosines => "reciprocal-cosines",
             Self::Highlight => "highlight",
+            Self::HighlightCosines => "highlight-cosines",
             Self::Algebraic => "algebraic",
         }
     }
@@ -108,6 +113,9 @@ impl Features {
                 "cos theta_i cos theta_o",
                 "cos theta_i + cos theta_o",
             ],
+            Self::HighlightCosines => {
+                &["sqrt theta_h", "cos theta_d", "cos theta_i", "cos theta_o"]
+            }
             Self::Algebraic => &[
                 "sqrt sin theta_h",
                 "cos^2 theta_d",
@@ -120,7 +128,10 @@ impl Features {
     /// these inputs is then reciprocal by construction.
     #[must_use]
     pub fn is_reciprocal(self) -> bool {
-        !matches!(self, Self::Paper | Self::Cosines | Self::SumDifference)
+        !matches!(
+            self,
+            Self::Paper | Self::Cosines | Self::SumDifference | Self::HighlightCosines
+        )
     }
 
     /// The inputs of each pair of directions, shape (pairs, inputs).
@@ -144,6 +155,7 @@ impl Features {
                 Self::SumDifference => fill(row, &sum_difference(pair)),
                 Self::ReciprocalCosines => fill(row, &reciprocal_cosines(pair)),
                 Self::Highlight => fill(row, &highlight(pair)),
+                Self::HighlightCosines => fill(row, &highlight_cosines(pair)),
                 Self::Algebraic => fill(row, &algebraic(pair)),
             }
         }
@@ -226,6 +238,16 @@ fn highlight(pair: &Pair) -> [f64; 4] {
     ]
 }
 
+fn highlight_cosines(pair: &Pair) -> [f64; 4] {
+    let angles = pair.half_difference();
+    [
+        angles.theta_h().sqrt(),
+        angles.cos_theta_d(),
+        pair.incident[2],
+        pair.outgoing[2],
+    ]
+}
+
 fn algebraic(pair: &Pair) -> [f64; 3] {
     let angles = pair.half_difference();
     let cosine = angles.cos_theta_d();
@@ -286,12 +308,16 @@ mod tests {
             incident: direction,
             outgoing: direction,
         };
-        let expected: [(Features, &[f64]); 5] = [
+        let expected: [(Features, &[f64]); 6] = [
             (Features::HalfDiff, &[FRAC_PI_3, 0.0, 1.0, 0.25, 0.75]),
             (Features::Cosines, &[0.5, 1.0, 0.5, 0.5]),
             (Features::SumDifference, &[0.5, 1.0, 1.0, 0.0]),
             (Features::ReciprocalCosines, &[0.5, 1.0, 1.0, 0.25]),
             (Features::Highlight, &[FRAC_PI_3.sqrt(), 1.0, 0.25, 1.0]),
+            (
+                Features::HighlightCosines,
+                &[FRAC_PI_3.sqrt(), 1.0, 0.5, 0.5],
+            ),
         ];
         for (set, values) in expected {
             let x = set.compute(&[pair]);
@@ -351,7 +377,10 @@ mod tests {
                 // Rounding of the azimuths moves the half vector by 1e-15 / cos(theta_d), and
                 // the root of an angle by the root of that at most.
                 let moved = 4e-15 / original.half_difference().cos_theta_d();
-                let has_root = matches!(set, Features::Highlight | Features::Algebraic);
+                let has_root = matches!(
+                    set,
+                    Features::Highlight | Features::HighlightCosines | Features::Algebraic
+                );
                 let tolerance = if has_root { moved.sqrt() } else { moved };
                 for other in [pair(turn, 1.0), pair(turn, -1.0)] {
                     let other = set.compute(&[other]);

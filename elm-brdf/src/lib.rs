@@ -25,6 +25,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod albedo;
 pub mod batch;
 pub mod brdf;
 pub mod cli;

@@ -47,6 +47,18 @@ impl NoiseFloor {
     }
 }
 
+/// Whether light, viewer and normal lie in one plane in all of these pairs, to half a degree: what
+/// a surface looks like from beside the plane of incidence is then not known.
+#[must_use]
+pub fn in_one_plane(pairs: &[Pair]) -> bool {
+    let across = |pair: &Pair| {
+        let (l, v) = (pair.incident, pair.outgoing);
+        (l[0] * v[1] - l[1] * v[0]).abs()
+    };
+    // The size of the product of both sines and that of the azimuth between them.
+    !pairs.is_empty() && pairs.iter().all(|pair| across(pair) <= 8.7e-3)
+}
+
 /// The pairs of measurements whose light and viewer are exchanged, up to a turn or a reflection of
 /// the surface about its normal: indices into `pairs`, the smaller first, ascending.
 ///
@@ -129,6 +141,25 @@ mod tests {
             incident: cartesian(theta_i, 0.4),
             outgoing: cartesian(theta_o, 0.4 + phi),
         }
+    }
+
+    #[test]
+    fn one_plane_is_told_from_all_others() {
+        use std::f64::consts::PI;
+        let plane: Vec<Pair> = (0..80)
+            .map(|row| {
+                pair(
+                    f64::from(row) / 60.0,
+                    0.35,
+                    if row % 2 == 0 { PI } else { 0.0 },
+                )
+            })
+            .collect();
+        assert!(in_one_plane(&plane));
+        assert!(!in_one_plane(
+            &[&plane[..], &[pair(0.3, 0.4, 0.5)]].concat()
+        ));
+        assert!(!in_one_plane(&[]));
     }
 
     #[test]

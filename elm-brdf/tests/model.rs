@@ -171,8 +171,10 @@ fn kinds() -> Vec<BrdfModel> {
         Tuned::default()
             .fit_model(&pairs, values.slice(s![.., ..1]))
             .unwrap(),
-        tuned(None).fit_model(&pairs, values.view()).unwrap(),
-        tuned(None)
+        tuned(Some(Features::SumDifference))
+            .fit_model(&pairs, values.view())
+            .unwrap(),
+        tuned(Some(Features::Highlight))
             .fit_model(&geometry::pairs(&paint.directions), paint.values.view())
             .unwrap(),
         params(plain.clone())
@@ -203,11 +205,17 @@ fn models_come_back_from_files_of_both_forms_bit_for_bit() {
 #[test]
 fn stored_numbers_are_those_that_the_file_holds() {
     let [averaged, single, pruned, given, on_rows] = kinds().try_into().unwrap();
-    // Each member: 400 weights and 4 scales; constant; 4 means and factors; offset and ceiling.
+    // Weights; for each input its mean, its factor and a scale in each draw; constant, offset and
+    // ceiling. As many as were measured.
+    let (neurons, inputs) = (
+        averaged.network().hidden().neurons(),
+        averaged.network().inputs(),
+    );
     assert_eq!(
         averaged.stored_floats(),
-        Tuned::MEMBERS * (400 + 4) + 1 + 8 + 2
+        neurons + (2 + Tuned::MEMBERS) * inputs + 3
     );
+    assert_eq!(averaged.stored_floats(), 205);
     assert_eq!(single.stored_floats(), 40 * 3 + 4 + 3 + 8 + 6);
     // 160 drawn, a bit each.
     let channels = pruned.channels();
@@ -269,7 +277,9 @@ fn one_seed_gives_one_model_and_another_gives_another() {
 #[test]
 fn damaged_and_lying_files_are_refused() {
     let (pairs, values) = measured(3);
-    let model = tuned(None).fit_model(&pairs, values.view()).unwrap();
+    let model = tuned(Some(Features::SumDifference))
+        .fit_model(&pairs, values.view())
+        .unwrap();
     let bytes = persist::to_bytes(&model).unwrap();
     for at in 0..bytes.len() {
         let mut damaged = bytes.clone();

@@ -48,13 +48,16 @@ pub(super) fn compute<A: Real>(set: Features, d: &[&[A; ROWS]; 6], x: &mut [Bloc
                 };
             }
         }
-        (Features::Highlight, [a, b, c, e, ..]) => {
+        (Features::Highlight | Features::HighlightCosines, [a, b, c, e, ..]) => {
             for r in 0..ROWS {
+                let (iz, oz) = (d[2][r], d[5][r]);
                 let s = Sum::of(d, r);
                 a.0[r] = s.across.sqrt().atan2(s.along).sqrt();
                 b.0[r] = s.cos_theta_d();
-                c.0[r] = d[2][r] * d[5][r];
-                e.0[r] = s.along;
+                (c.0[r], e.0[r]) = match set {
+                    Features::Highlight => (iz * oz, s.along),
+                    _ => (iz, oz),
+                };
             }
         }
         (Features::Algebraic, [a, b, c, ..]) => {

@@ -23,7 +23,8 @@ pub(super) const POOLED: &str = "elm (prior)";
 fn tuned(name: &str, seed: u64) -> Reference {
     Reference {
         name: name.to_owned(),
-        features: Some(Features::SumDifference),
+        // Chosen for each material.
+        features: None,
         link: Some(Link::default_log()),
         growth: Growth::Linear,
         network: true,
@@ -133,7 +134,9 @@ fn networks(seed: u64) -> [Reference; 4] {
         tuned(TUNED, seed),
         // What is fitted to count its numbers: a network without the prior, of as many neurons.
         Reference {
+            features: Some(Features::SumDifference),
             method: Box::new(Tuned {
+                features: Some(Features::SumDifference),
                 neurons: Some(PriorParams::default().neurons),
                 seed,
                 ..Tuned::default()

@@ -79,8 +79,8 @@ pub struct Provenance {
     pub seed: u64,
     /// The measure that settings were chosen by; `None` where all were given.
     pub metric: Option<Metric>,
-    /// Errors on measurements that were held out when settings had been chosen; `None` where none
-    /// were.
+    /// Errors of the network on measurements that were held out: its output weights found without
+    /// them, its settings chosen with them. `None` where none were.
     pub held_out: Option<Metrics>,
     /// Standard deviation of the measurements' noise in 1/sr, from pairs that are reciprocal to
     /// each other; `None` where there are none.

@@ -1,8 +1,14 @@
 //! A reflectance model whose settings are chosen by held-out errors.
 
+mod anchors;
+mod censored;
 mod few;
+mod finish;
 mod lean;
 mod many;
+mod moments;
+mod rows;
+mod survey;
 
 use elm::{Activation, Biases, Distribution, Elm, ElmParams, HiddenLayer, Neurons, Scaler};
 use ndarray::{Array1, Array2, ArrayView2, Axis};
@@ -14,6 +20,7 @@ use crate::features::Features;
 use crate::geometry::Pair;
 use crate::metrics::Metric;
 use crate::quality;
+use finish::{Finished, Problem};
 pub use lean::Lean;
 
 /// Fits a network and chooses what is left open: inputs, the scale of each input, regularisation,
@@ -29,19 +36,30 @@ pub use lean::Lean;
 /// | `max_floats` | none | most numbers that the model may store |
 /// | `seed` | 1 | random layers, and rows drawn for the search |
 ///
+/// **Inputs** are chosen among all sets but the paper's. Of networks that are equally good to 3 % the
+/// reciprocal one is taken, and before any of them one whose [albedo](crate::albedo) is physical: at no
+/// angle above 1, unless that of the nearest measurements is.
+///
 /// **Few measurements** (up to [`Tuned::MANY`]): sine neurons with random frequencies. The scales of
-/// the inputs are tried from a fixed low-discrepancy set, each with its strength of regularisation by
-/// exact leave-one-out; the best [`MEMBERS`](Tuned::MEMBERS), judged by their
-/// [evidence](elm::validate::Validator::log_evidence) for RMSE and by leave-one-out for other metrics,
-/// are averaged into one network, 400 neurons each. With `neurons` or `max_floats` given, the best
-/// alone is taken. Inputs are [`Features::SumDifference`] unless said otherwise.
+/// the inputs are tried from a fixed low-discrepancy set and ranked by their
+/// [evidence](elm::validate::Validator::log_evidence); the neurons of the best
+/// [`MEMBERS`](Tuned::MEMBERS) stand side by side in one network, which stores no more numbers than were
+/// measured, and of more than 1000 no more than half as many. With `neurons` or `max_floats` given, the
+/// best alone is taken.
 ///
 /// **Many measurements**: inputs and scales by a search on part of the rows, judged on others; then
-/// more neurons than wanted are drawn and the less useful are [pruned](elm::prune); then one solve on
-/// all rows, weighted by what the metric makes of an error. 213 neurons unless said otherwise, which
-/// for three channels is 675 stored numbers. The errors in the model's
-/// [provenance](super::Provenance) are those of the search's small network on the rows that judged it:
-/// an upper bound more than an estimate.
+/// more neurons than wanted are drawn and the less useful are [pruned](elm::prune). 213 neurons unless
+/// said otherwise, which for three channels is 675 stored numbers.
+///
+/// Either way one solve on all rows, weighted by what the metric makes of an error, finds the output
+/// weights. Its strength of regularisation makes small the error at rows left out, five folds in turn, and
+/// with it the error that single precision would add. Where nothing was measured the nearest measurements
+/// pull weakly, so that the network is tame there. Noise of dark values is accounted for: the link's offset
+/// is at least three of its standard deviations, and where RMSE is asked for the fit is of the mean value,
+/// not of the value of the mean target.
+///
+/// The errors in the model's [provenance](super::Provenance) are those of the network itself at rows left
+/// out, its output weights found without them; its inputs and their scales were chosen with all rows.
 ///
 /// As [`Fit`] every channel is chosen for by itself; [`fit_model`](Self::fit_model) makes one network
 /// for all channels.
@@ -88,8 +106,10 @@ impl Default for Tuned {
 impl Tuned {
     /// With more measurements than this they count as many.
     pub const MANY: usize = 1500;
-    /// Networks that are averaged for few measurements.
-    pub const MEMBERS: usize = 6;
+    /// Neurons that measurements always warrant, if there are as many.
+    const FEWEST: usize = 48;
+    /// Candidates whose neurons stand side by side for few measurements.
+    pub const MEMBERS: usize = 3;
 
     /// Fits one network for all channels of `values` (BRDF in 1/sr, shape (pairs, channels)).
     ///
@@ -107,37 +127,76 @@ impl Tuned {
         }))
     }
 
-    /// The sets of inputs to choose among.
-    fn sets(&self, open: &[Features]) -> Vec<Features> {
-        self.features.map_or_else(|| open.to_vec(), |set| vec![set])
+    /// The sets of inputs to choose among: all but the paper's, which no material is best served by.
+    fn sets(&self) -> Vec<Features> {
+        let all = || Features::ALL.into_iter().filter(|&s| s != Features::Paper);
+        self.features
+            .map_or_else(|| all().collect(), |set| vec![set])
     }
 
-    /// The neurons that the limits allow, or `usual`. `drawn` says how many are drawn for so many
-    /// to be kept, which of them being a bit each; `per_link` numbers go with each channel's link.
-    fn size(
+    /// The most numbers to be stored: what is asked for, or what was measured, of more than a
+    /// thousand half; `None` where the neurons are given and the numbers are not.
+    fn most_floats(&self, rows: usize, channels: usize) -> Option<usize> {
+        let measured = rows * channels;
+        let warranted = if measured > 1000 {
+            (measured / 2).max(1000)
+        } else {
+            measured
+        };
+        match (self.max_floats, self.neurons) {
+            (None, None) => Some(warranted),
+            (asked, _) => asked,
+        }
+    }
+
+    /// The neurons that the limits allow, or `usual`, in `draws` draws. `drawn` says how many are
+    /// drawn for so many to be kept, which of them being a bit each.
+    fn size_of(
         &self,
         usual: usize,
+        rows: usize,
         inputs: usize,
         channels: usize,
-        per_link: usize,
+        draws: usize,
         drawn: impl Fn(usize) -> usize,
     ) -> Result<usize> {
         let wanted = self.neurons.unwrap_or(usual);
-        let Some(most) = self.max_floats else {
+        let Some(most) = self.most_floats(rows, channels) else {
             return Ok(wanted);
         };
-        // Mean, factor and scale of each input; constant and link of each channel.
-        let fixed = 3 * inputs + channels * (1 + per_link);
+        // Mean and factor of each input, scales of each draw; constant and link of each channel.
+        let fixed = (2 + draws) * inputs + 3 * channels;
         let floats = |neurons: usize| fixed + channels * neurons + drawn(neurons).div_ceil(32);
-        let largest = self.neurons.unwrap_or(most / channels);
-        (1..=largest)
-            .rev()
-            .find(|&neurons| floats(neurons) <= most)
-            .ok_or(Error::Elm(elm::Error::Parameter {
+        let largest = match (self.neurons, self.max_floats) {
+            (Some(neurons), _) => neurons,
+            (None, Some(most)) => most / channels,
+            (None, None) => usual,
+        };
+        let found = (1..=largest).rev().find(|&neurons| floats(neurons) <= most);
+        // Of few measurements the scales leave nothing: one neuron for each then.
+        let least = rows.min(Self::FEWEST).min(usual);
+        match (found, self.max_floats) {
+            (Some(neurons), None) if self.neurons.is_none() => Ok(neurons.max(least)),
+            (Some(neurons), _) => Ok(neurons),
+            (None, None) => Ok(least),
+            (None, Some(_)) => Err(Error::Elm(elm::Error::Parameter {
                 name: "max_floats",
                 value: most as f64,
                 expected: "enough for the scales, the links and one neuron: some 20 and more",
-            }))
+            })),
+        }
+    }
+
+    /// The same where all that are drawn are kept.
+    fn size(
+        &self,
+        usual: usize,
+        rows: usize,
+        inputs: usize,
+        channels: usize,
+        draws: usize,
+    ) -> Result<usize> {
+        self.size_of(usual, rows, inputs, channels, draws, |_| 0)
     }
 
     /// Sine neurons of normal frequencies at three scales: heavier tails than one scale has.
@@ -148,6 +207,8 @@ impl Tuned {
             .distribution(Distribution::Normal)
             .biases(Biases::Scaled(std::f64::consts::PI))
             .input_scales(input_scales.to_vec())
+            // Directions are bounded by themselves, and measurements end short of the horizon.
+            .bounded(false)
             .seed(self.seed);
         let group = |scale: f64| {
             Neurons::new(third, Activation::Sine)
@@ -231,6 +292,61 @@ impl Blank {
     fn matrix(&self, x: &Array2<f64>) -> Result<Array2<f64>> {
         Ok(self.network.hidden_matrix(x)?)
     }
+}
+
+/// Noise counts as large where it raises a link's offset by more than this: from a sixth of the median
+/// value on.
+const NOISY: f64 = 5.0;
+/// How much worse a reciprocal network may be and still be taken.
+const TIE: f64 = 1.03;
+
+/// The better of two networks: one whose albedo is physical, then the reciprocal one where they tie,
+/// then the one with the smaller error.
+fn better(one: Finished, other: Finished) -> Finished {
+    let physical = |finished: &Finished| finished.excess <= 0.0;
+    match (physical(&one), physical(&other)) {
+        (true, false) => return one,
+        (false, true) => return other,
+        (false, false) => {
+            return if other.excess < one.excess {
+                other
+            } else {
+                one
+            };
+        }
+        (true, true) => {}
+    }
+    let handicap = |finished: &Finished| {
+        if finished.features.is_reciprocal() {
+            finished.score
+        } else {
+            TIE * finished.score
+        }
+    };
+    if handicap(&other) < handicap(&one) {
+        other
+    } else {
+        one
+    }
+}
+
+fn model_of(problem: &Problem<'_>, finished: Finished) -> Result<BrdfModel> {
+    let Problem {
+        tuned,
+        pairs,
+        values,
+        link,
+        ..
+    } = problem;
+    let mut about = provenance(tuned.seed, tuned.metric, pairs, *values);
+    about.held_out = finished.held_out;
+    let Finished {
+        features,
+        layer,
+        network,
+        ..
+    } = finished;
+    Ok(BrdfModel::new(features, link.clone(), layer, network).with_provenance(about))
 }
 
 /// A network that is not fitted yet.

@@ -40,7 +40,7 @@ impl Frame {
     }
 
     fn standardise(&self, raw: Array2<f64>) -> Array2<f64> {
-        (raw - &self.scaler.mean()) * &self.scaler.factor()
+        (raw - self.scaler.mean()) * self.scaler.factor()
     }
 
     /// Points of these directions, shape (pairs, inputs).

@@ -1,29 +1,48 @@
-//! Few measurements: every candidate by its evidence, the best of them averaged.
+//! Few measurements: inputs and their scales by evidence, the best layers side by side.
 
 use std::f64::consts::PI;
 
-use elm::solve::{LeastSquares, Ridge};
-use elm::validate::Validator;
-use elm::{Activation, Biases, Distribution, Elm, ElmParams, HiddenLayer, Scaler};
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, concatenate};
+use elm::{Activation, Biases, Distribution, ElmParams, Scaler};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Slice};
+use rand::SeedableRng;
+use rand::seq::index;
+use rand_chacha::ChaCha8Rng;
 
-use super::{Blank, Tuned, provenance};
+use super::finish::{Finished, Problem};
+use super::many::row_weights;
+use super::moments::Moments;
+use super::{Blank, NOISY, Tuned, better, model_of};
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::geometry::Pair;
 use crate::link::{FittedLink, Link};
-use crate::metrics::{Metric, Metrics};
-use crate::model::{BrdfModel, Layer, Provenance};
+use crate::model::BrdfModel;
 use crate::scales::spread;
 
-/// Neurons of a candidate.
+/// Most neurons, unless they are asked for.
 const NEURONS: usize = 400;
-/// Candidates for the scales of inputs, per set of inputs.
-const CANDIDATES: usize = 128;
+/// Measurements for each candidate that takes part in the network.
+const MEMBER: usize = 50;
+/// Neurons of a candidate in the search.
+const SEARCH_NEURONS: usize = 128;
+/// Rows that candidates are judged by, at most.
+const SEARCH_ROWS: usize = 600;
+/// Candidates for the scales of inputs: for every set of inputs, and for the sets that look best.
+const FIRST: usize = 20;
+const CANDIDATES: usize = 96;
+/// Sets that look best.
+const SETS: usize = 2;
 /// Scales tried, in units of the inputs' standard deviations: from nearly linear to several waves.
 const SCALES: (f64, f64) = (0.05, 3.3);
 /// Degrees of freedom of the frequencies: those of Matérn's covariance 5/2.
 const FREEDOM: u8 = 5;
+/// Strengths tried, relative to the sum of the columns' squares.
+const STRENGTHS: [f64; 6] = [1e-10, 1e-8, 1e-7, 1e-6, 1e-5, 1e-3];
+/// Sets that are fitted to all rows, at most, where none returns less light than it receives.
+const MOST_FINISHED: usize = 4;
+/// Another set is fitted too where its evidence is lower by no more than this for each row: an error
+/// of the targets that is higher by this share.
+const CLOSE: f64 = 0.03;
 
 /// One model for each group of channels.
 pub(super) fn fit(
@@ -32,263 +51,300 @@ pub(super) fn fit(
     values: ArrayView2<'_, f64>,
     groups: &[Vec<usize>],
 ) -> Result<Vec<BrdfModel>> {
-    let link = Link::default_log();
-    let targets = link.fit(values)?.to_targets(values)?;
-    let groups: Vec<Group> = groups
-        .iter()
-        .map(|channels| Group::new(channels, values))
-        .collect::<Result<_>>()?;
-    let channels = groups.iter().map(|g| g.channels.len()).max().unwrap_or(1);
-    let search = Search::new(tuned, pairs, channels)?;
-    let scores = search.scores(tuned.metric, pairs, &targets, &groups)?;
-    let choices: Vec<Vec<usize>> = scores
-        .columns()
-        .into_iter()
-        .map(|scores| search.best(scores))
-        .collect();
-    // One factorisation of a candidate serves every group that has taken it.
-    let mut networks = Vec::new();
-    for candidate in 0..CANDIDATES {
-        let taken = groups.iter().zip(&choices);
-        let taken = taken.filter(|(_, members)| members.contains(&candidate));
-        let mut columns: Vec<usize> = taken.flat_map(|(g, _)| g.channels.clone()).collect();
-        columns.sort_unstable();
-        columns.dedup();
-        networks.push(if columns.is_empty() {
-            None
-        } else {
-            Some(search.network(candidate, &targets, columns)?)
-        });
+    let mut link = Link::default_log().fit(values)?;
+    let mut search = Search::new(tuned, pairs, values, &link)?;
+    search.run(groups)?;
+    let noise = search.noise(groups, &link)?;
+    let raised = link.raise_offsets(&noise);
+    if raised.iter().any(|&factor| factor > 1.0) {
+        search = Search::new(tuned, pairs, values, &link)?;
+        search.run(groups)?;
     }
-    let about = provenance(tuned.seed, tuned.metric, pairs, values);
-    let model = |(group, members): (&Group, Vec<usize>)| {
-        let taken = members.iter().filter_map(|&c| networks[c].as_ref());
-        let taken: Vec<&Network> = taken.collect();
-        let (layer, network) = average(&search.scaler, &taken, &group.channels)?;
-        let share = 1.0 / taken.len() as f64;
-        let mut left_out = Array2::zeros(group.values.dim());
-        for network in taken {
-            left_out.scaled_add(share, &network.of(&network.left_out, &group.channels));
-        }
-        let about = Provenance {
-            held_out: Some(group.metrics(pairs, &targets, &left_out)?),
-            ..about.clone()
-        };
-        let link = group.link.clone();
-        Ok(BrdfModel::new(search.set, link, layer, network).with_provenance(about))
-    };
-    groups.iter().zip(choices).map(model).collect()
-}
-
-/// Channels that one network is for.
-struct Group {
-    channels: Vec<usize>,
-    values: Array2<f64>,
-    link: FittedLink,
-}
-
-impl Group {
-    fn new(channels: &[usize], values: ArrayView2<'_, f64>) -> Result<Self> {
+    let fit_group = |channels: &Vec<usize>| {
         let values = values.select(Axis(1), channels);
-        Ok(Self {
-            channels: channels.to_vec(),
-            link: Link::default_log().fit(values.view())?,
-            values,
-        })
-    }
-
-    /// Errors where the targets of this group's channels are missed by `residuals`.
-    fn metrics(
-        &self,
-        pairs: &[Pair],
-        targets: &Array2<f64>,
-        residuals: &Array2<f64>,
-    ) -> Result<Metrics> {
-        let targets = targets.select(Axis(1), &self.channels);
-        let predicted = self.link.to_values(targets - residuals)?;
-        Metrics::of(pairs, predicted.view(), self.values.view())
-    }
+        let link = link.select(channels);
+        let noise = channels.iter().map(|&channel| noise[channel]).collect();
+        let noisy = channels.iter().any(|&channel| raised[channel] > NOISY);
+        let problem = Problem::new(tuned, pairs, values.view(), link, noise, noisy)?;
+        model_of(&problem, search.fitted(channels, &problem)?)
+    };
+    groups.iter().map(fit_group).collect()
 }
 
-/// A candidate fitted to some of the channels.
-struct Network {
-    blank: Blank,
-    /// Which channels, in order.
-    columns: Vec<usize>,
-    beta: Array2<f64>,
-    intercept: Array1<f64>,
-    /// What leave-one-out misses the targets by.
-    left_out: Array2<f64>,
+/// A set of inputs, and its candidates so far.
+struct Set {
+    features: Features,
+    /// Of all rows, and of those of the search.
+    x: Array2<f64>,
+    part: Array2<f64>,
+    scaler: Scaler<f64>,
+    /// Shape (candidates, inputs).
+    scales: Array2<f64>,
+    /// For each candidate tried, the log evidence of each channel at its best strength, and that
+    /// strength.
+    tried: Vec<Vec<(f64, f64)>>,
 }
 
-impl Network {
-    /// Of a matrix with a column for each of the network's channels those of these.
-    fn of(&self, matrix: &Array2<f64>, channels: &[usize]) -> Array2<f64> {
-        let place = |channel: &usize| self.columns.iter().position(|c| c == channel);
-        let columns: Vec<usize> = channels.iter().filter_map(place).collect();
-        matrix.select(Axis(1), &columns)
+impl Set {
+    /// The candidates by their evidence for these channels, the best first.
+    fn ranked(&self, channels: &[usize]) -> Vec<(f64, usize)> {
+        let sum = |tried: &Vec<(f64, f64)>| channels.iter().map(|&c| tried[c].0).sum::<f64>();
+        let mut ranked: Vec<(f64, usize)> = self.tried.iter().map(sum).zip(0..).collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+        ranked
+    }
+
+    fn best(&self, channels: &[usize]) -> f64 {
+        let ranked = self.ranked(channels);
+        ranked.first().map_or(f64::NEG_INFINITY, |best| best.0)
     }
 }
 
 /// What is common to all candidates.
-struct Search {
-    set: Features,
-    scaler: Scaler<f64>,
-    x: Array2<f64>,
-    params: Vec<ElmParams<f64>>,
-    members: usize,
+struct Search<'a> {
+    tuned: &'a Tuned,
+    rows: Vec<usize>,
+    values: ArrayView2<'a, f64>,
+    targets: Array2<f64>,
+    weights: Option<Array1<f64>>,
+    sets: Vec<Set>,
 }
 
-impl Search {
-    fn new(tuned: &Tuned, pairs: &[Pair], channels: usize) -> Result<Self> {
-        let set = tuned.features.unwrap_or(Features::SumDifference);
-        let x = set.compute_training(pairs);
-        let neurons = tuned.size(NEURONS, x.ncols(), channels, 2, |_| 0)?;
-        let limited = tuned.neurons.is_some() || tuned.max_floats.is_some();
-        let params = |scales: ArrayView1<'_, f64>| {
-            ElmParams::new(neurons)
-                .activation(Activation::Sine)
-                .distribution(Distribution::StudentT(FREEDOM))
-                .biases(Biases::Scaled(PI))
-                .input_scales(scales.to_vec())
-                .seed(tuned.seed)
-        };
-        let scales = spread(CANDIDATES, x.ncols(), SCALES);
+impl<'a> Search<'a> {
+    fn new(
+        tuned: &'a Tuned,
+        pairs: &[Pair],
+        values: ArrayView2<'a, f64>,
+        link: &FittedLink,
+    ) -> Result<Self> {
+        let mut random = ChaCha8Rng::seed_from_u64(tuned.seed);
+        random.set_stream(7);
+        let count = pairs.len().min(SEARCH_ROWS);
+        let rows = index::sample(&mut random, pairs.len(), count).into_vec();
+        let sets = tuned.sets().into_iter().map(|features| {
+            let x = features.compute_training(pairs);
+            Ok(Set {
+                features,
+                part: x.select(Axis(0), &rows),
+                scaler: Scaler::measured(&x)?,
+                scales: spread(CANDIDATES, x.ncols(), SCALES),
+                x,
+                tried: Vec::new(),
+            })
+        });
+        let weights = row_weights(tuned.metric, pairs, values, link);
         Ok(Self {
-            set,
-            scaler: Scaler::measured(&x)?,
-            params: scales.rows().into_iter().map(params).collect(),
-            x,
-            members: if limited { 1 } else { Tuned::MEMBERS },
+            sets: sets.collect::<Result<_>>()?,
+            targets: link.to_targets(values)?.select(Axis(0), &rows),
+            weights: weights.map(|weights| weights.select(Axis(0), &rows)),
+            tuned,
+            values,
+            rows,
         })
     }
 
-    /// How bad each candidate is for each group, shape (candidates, groups).
-    fn scores(
-        &self,
-        metric: Metric,
-        pairs: &[Pair],
-        targets: &Array2<f64>,
-        groups: &[Group],
-    ) -> Result<Array2<f64>> {
-        let mut scores = Array2::zeros((CANDIDATES, groups.len()));
-        for (candidate, mut scores) in scores.rows_mut().into_iter().enumerate() {
-            let (_, validator) = self.validator(candidate, targets)?;
-            // A few bright rows decide the RMSE, and would decide which candidate is taken; the
-            // evidence of targets, which are all of one size, chooses better.
-            if metric == Metric::Rmse {
-                let evidence = most_evidence(&validator);
-                for (score, group) in scores.iter_mut().zip(groups) {
-                    *score = -evidence.select(Axis(0), &group.channels).sum();
-                }
-            } else {
-                let (_, left_out) = leave_one_out(&validator, targets)?;
-                for (score, group) in scores.iter_mut().zip(groups) {
-                    let residuals = left_out.select(Axis(1), &group.channels);
-                    *score = metric.of(&group.metrics(pairs, targets, &residuals)?);
+    /// Tries some candidates of all sets, and all of those that look best for some group.
+    fn run(&mut self, groups: &[Vec<usize>]) -> Result<()> {
+        for set in 0..self.sets.len() {
+            self.extend(set, FIRST)?;
+        }
+        let mut chosen: Vec<usize> = groups
+            .iter()
+            .flat_map(|channels| self.order(channels).into_iter().take(SETS))
+            .collect();
+        chosen.sort_unstable();
+        chosen.dedup();
+        for set in chosen {
+            self.extend(set, CANDIDATES)?;
+        }
+        Ok(())
+    }
+
+    /// The sets by their evidence for these channels, the best first.
+    fn order(&self, channels: &[usize]) -> Vec<usize> {
+        let best: Vec<f64> = self.sets.iter().map(|set| set.best(channels)).collect();
+        let mut order: Vec<usize> = (0..self.sets.len()).collect();
+        order.sort_by(|&a, &b| best[b].total_cmp(&best[a]));
+        order
+    }
+
+    fn extend(&mut self, set: usize, count: usize) -> Result<()> {
+        for candidate in self.sets[set].tried.len()..count {
+            let h = self.hidden(&self.sets[set], candidate)?;
+            let moments = Moments::of(h.view(), self.targets.view(), self.weights.as_ref());
+            let mut most = vec![(f64::NEG_INFINITY, STRENGTHS[0]); self.targets.ncols()];
+            for strength in STRENGTHS {
+                let strength = strength * moments.scale();
+                let Some(factor) = moments.factor(strength) else {
+                    continue;
+                };
+                for (most, evidence) in most.iter_mut().zip(factor.evidence(&moments)) {
+                    if evidence > most.0 {
+                        *most = (evidence, strength);
+                    }
                 }
             }
+            self.sets[set].tried.push(most);
         }
-        Ok(scores)
+        Ok(())
     }
 
-    /// The candidates that a group takes, the best first.
-    fn best(&self, scores: ArrayView1<'_, f64>) -> Vec<usize> {
-        let mut ranked: Vec<usize> = (0..scores.len()).collect();
-        ranked.sort_by(|&a, &b| scores[a].total_cmp(&scores[b]));
-        ranked.truncate(self.members);
-        ranked
+    fn params(&self, set: &Set, candidate: usize, neurons: usize) -> ElmParams<f64> {
+        ElmParams::new(neurons)
+            .activation(Activation::Sine)
+            .distribution(Distribution::StudentT(FREEDOM))
+            .biases(Biases::Scaled(PI))
+            .input_scales(set.scales.row(candidate).to_vec())
+            .bounded(false)
+            // Candidates draw for themselves, so that those averaged err differently.
+            .seed(self.tuned.seed.wrapping_add(1000 * (candidate as u64 + 1)))
     }
 
-    /// A candidate's layer, and its matrix factorised.
-    fn validator(
-        &self,
-        candidate: usize,
-        targets: &Array2<f64>,
-    ) -> Result<(Blank, Validator<f64>)> {
-        let params = self.params[candidate].clone();
-        let blank = Blank::new(params, self.x.ncols(), &self.scaler)?;
-        let h = blank.matrix(&self.x)?;
-        let validator = Validator::new(&LeastSquares::new(&h, targets)?.intercept(true))?;
-        Ok((blank, validator))
+    /// The hidden-layer matrix of a candidate at the rows of the search.
+    fn hidden(&self, set: &Set, candidate: usize) -> Result<Array2<f64>> {
+        let params = self.params(set, candidate, SEARCH_NEURONS);
+        let blank = Blank::new(params, set.part.ncols(), &set.scaler)?;
+        blank.matrix(&set.part)
     }
 
-    fn network(
-        &self,
-        candidate: usize,
-        targets: &Array2<f64>,
-        columns: Vec<usize>,
-    ) -> Result<Network> {
-        let targets = targets.select(Axis(1), &columns);
-        let (blank, validator) = self.validator(candidate, &targets)?;
-        let (lambda, left_out) = leave_one_out(&validator, &targets)?;
-        let solution = validator.solve(&lambda)?;
-        Ok(Network {
-            blank,
-            columns,
-            beta: solution.beta,
-            intercept: solution.intercept,
-            left_out,
-        })
+    /// The standard deviation of the noise of each channel's dark half, in 1/sr: of what its best
+    /// candidate is off by at rows left out, by the median, which a few bad rows do not move.
+    fn noise(&self, groups: &[Vec<usize>], link: &FittedLink) -> Result<Vec<f64>> {
+        let mut noise = vec![0.0; self.values.ncols()];
+        let rows = self.rows.len();
+        if rows < 4 * FOLDS {
+            return Ok(noise);
+        }
+        for channels in groups {
+            let Some(&best) = self.order(channels).first() else {
+                continue;
+            };
+            let set = &self.sets[best];
+            let Some(&(_, candidate)) = set.ranked(channels).first() else {
+                continue;
+            };
+            let h = self.hidden(set, candidate)?;
+            let link = link.select(channels);
+            let targets = self.targets.select(Axis(1), channels);
+            let strength = set.tried[candidate][channels[0]].1;
+            let Some(fitted) = left_out(&h, &targets, self.weights.as_ref(), strength) else {
+                continue;
+            };
+            let fitted = link.to_values(fitted)?;
+            let values = self.values.select(Axis(0), &self.rows);
+            for (fitted, &channel) in fitted.columns().into_iter().zip(channels) {
+                noise[channel] = dark_noise(fitted, values.column(channel));
+            }
+        }
+        Ok(noise)
     }
-}
 
-/// Log evidence of each channel at the strength where that is largest.
-fn most_evidence(validator: &Validator<f64>) -> Array1<f64> {
-    let mut most = Array1::from_elem(validator.outputs(), f64::NEG_INFINITY);
-    for strength in Ridge::candidates() {
-        // One measurement: no evidence for anything.
-        let Ok(evidence) = validator.log_evidence(&[strength]) else {
-            break;
+    /// The best of the sets that are close to the best, for these channels.
+    fn fitted(&self, channels: &[usize], problem: &Problem<'_>) -> Result<Finished> {
+        let order = self.order(channels);
+        let most = order
+            .first()
+            .map_or(f64::NEG_INFINITY, |&set| self.sets[set].best(channels));
+        let least = most - CLOSE * (self.rows.len() * channels.len()) as f64;
+        let mut found: Option<Finished> = None;
+        for (number, &set) in order.iter().enumerate() {
+            let set = &self.sets[set];
+            let close = set.best(channels) >= least && number < SETS + 1;
+            let physical = found.as_ref().is_some_and(|found| found.excess <= 0.0);
+            if physical && !close || number >= MOST_FINISHED {
+                continue;
+            }
+            let finished = self.finished(set, channels, problem)?;
+            found = Some(match found {
+                None => finished,
+                Some(known) => better(known, finished),
+            });
+        }
+        found.ok_or(Error::Elm(elm::Error::NoConvergence {
+            what: "the search for a network",
+        }))
+    }
+
+    /// The best candidates of a set side by side in one network.
+    fn finished(&self, set: &Set, channels: &[usize], problem: &Problem<'_>) -> Result<Finished> {
+        let tuned = self.tuned;
+        let limited = tuned.neurons.is_some() || tuned.max_floats.is_some();
+        let inputs = set.x.ncols();
+        let members = if limited {
+            1
+        } else {
+            // Some thirty neurons each at least.
+            (set.x.nrows() / MEMBER).clamp(1, Tuned::MEMBERS)
         };
-        most.zip_mut_with(&Array1::from(evidence), |most, &found| {
-            *most = most.max(found);
+        let neurons = tuned.size(NEURONS, set.x.nrows(), inputs, channels.len(), members)?;
+        let members = members.min(neurons);
+        let blanks = set.ranked(channels).into_iter().take(members).enumerate();
+        let blanks = blanks.map(|(member, (_, candidate))| {
+            let share = (neurons + member) / members;
+            Blank::new(self.params(set, candidate, share), inputs, &set.scaler)
         });
+        let blanks: Vec<Blank> = blanks.collect::<Result<_>>()?;
+        problem.finish(set.features, &set.scaler, &blanks, &set.x)
     }
-    most
 }
 
-/// The strengths that leave-one-out chooses, and what it misses the targets by.
-fn leave_one_out(
-    validator: &Validator<f64>,
+/// Folds for the noise.
+const FOLDS: usize = 5;
+
+/// The targets of each row by the fit without its fold; rows are in random order.
+fn left_out(
+    h: &Array2<f64>,
     targets: &Array2<f64>,
-) -> Result<(Vec<f64>, Array2<f64>)> {
-    let lambda = validator.strengths(Ridge::leave_one_out())?;
-    let residuals = match validator.leave_one_out(&lambda) {
-        Ok(held_out) => held_out.residuals().to_owned(),
-        // One measurement: nothing can be left out of it.
-        Err(elm::Error::Undetermined { .. }) => targets.clone(),
-        Err(error) => return Err(error.into()),
+    weights: Option<&Array1<f64>>,
+    strength: f64,
+) -> Option<Array2<f64>> {
+    let rows = h.nrows();
+    let part = |rows: std::ops::Range<usize>| {
+        let rows = Slice::from(rows);
+        let weights = weights.map(|weights| weights.slice_axis(Axis(0), rows).to_owned());
+        let (h, targets) = (
+            h.slice_axis(Axis(0), rows),
+            targets.slice_axis(Axis(0), rows),
+        );
+        Moments::of(h, targets, weights.as_ref())
     };
-    Ok((lambda, residuals))
+    let all = part(0..rows);
+    let mut fitted = Array2::zeros(targets.dim());
+    for fold in 0..FOLDS {
+        let fold = fold * rows / FOLDS..(fold + 1) * rows / FOLDS;
+        let mut others = all.clone();
+        others.add(&part(fold.clone()), -1.0);
+        let weights = others.factor(strength)?.solve(&others);
+        let fold = Slice::from(fold);
+        let mut there = fitted.slice_axis_mut(Axis(0), fold);
+        there.assign(&weights.apply(h.slice_axis(Axis(0), fold)));
+    }
+    Some(fitted)
 }
 
-/// One network, the mean of `networks`, for the channels of a group.
-fn average(
-    scaler: &Scaler<f64>,
-    networks: &[&Network],
-    group: &[usize],
-) -> Result<(Layer, Elm<f64>)> {
-    let share = 1.0 / networks.len() as f64;
-    let mut betas = Vec::new();
-    let mut intercept = Array1::zeros(group.len());
-    for network in networks {
-        betas.push(network.of(&network.beta, group) * share);
-        let constants = network.intercept.view().insert_axis(Axis(0)).to_owned();
-        intercept.scaled_add(share, &network.of(&constants, group).row(0));
+/// The standard deviation that the errors at the darker half of the rows have, by their median
+/// distance from their median.
+pub(super) fn dark_noise(fitted: ArrayView1<'_, f64>, values: ArrayView1<'_, f64>) -> f64 {
+    let middle = |values: &mut Vec<f64>| {
+        let place = values.len() / 2;
+        *values.select_nth_unstable_by(place, f64::total_cmp).1
+    };
+    if fitted.is_empty() {
+        return 0.0;
     }
-    let views: Vec<_> = betas.iter().map(|beta| beta.view()).collect();
-    // All neurons are sines, so that they stand in the order of the layers.
-    let beta = concatenate(Axis(0), &views).map_err(|_| {
-        Error::Elm(elm::Error::Empty {
-            what: "networks",
-            rows: 0,
-            columns: group.len(),
-        })
-    })?;
-    let layers = networks.iter().map(|n| n.blank.network.hidden().clone());
-    let hidden = HiddenLayer::joined(&layers.collect::<Vec<_>>())?;
-    let draws = networks.iter().map(|n| n.blank.draw.clone()).collect();
-    let network = Elm::from_parts(Some(scaler.clone()), hidden, beta, intercept)?;
-    Ok((Layer::Drawn(draws), network))
+    let dark = middle(&mut fitted.to_vec());
+    let rows = fitted
+        .iter()
+        .zip(values)
+        .filter(|(fitted, _)| **fitted <= dark);
+    let mut errors: Vec<f64> = rows.map(|(fitted, value)| value - fitted).collect();
+    if errors.is_empty() {
+        return 0.0;
+    }
+    let centre = middle(&mut errors);
+    errors
+        .iter_mut()
+        .for_each(|error| *error = (*error - centre).abs());
+    // The median of a normal deviate's size is 0.6745 standard deviations.
+    middle(&mut errors) / 0.6745
 }

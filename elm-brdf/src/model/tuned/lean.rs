@@ -227,6 +227,7 @@ impl Search<'_> {
             .distribution(Distribution::Normal)
             .input_scales(scales.clone())
             .biases(Biases::Scaled(bias))
+            .bounded(false)
             .seed(self.lean.seed);
         let mut blank = Blank::new(params.clone(), scales.len(), self.scaler)?;
         let params = params.solver(self.ridge).check()?;

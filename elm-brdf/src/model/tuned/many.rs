@@ -8,13 +8,15 @@ use rand::SeedableRng;
 use rand::seq::index;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Blank, Tuned, provenance};
-use crate::error::Result;
+use super::few::dark_noise;
+use super::finish::{Finished, Problem, cut_off_means, geometric_root};
+use super::{Blank, NOISY, TIE, Tuned, better, model_of, without_weights};
+use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::geometry::Pair;
 use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
-use crate::model::{BrdfModel, Layer};
+use crate::model::BrdfModel;
 
 /// Neurons unless said otherwise: some 675 numbers for three channels.
 pub(super) const NEURONS: usize = 213;
@@ -28,6 +30,15 @@ const SEARCH_NEURONS: usize = 96;
 pub(super) const RIDGE: f64 = 3e-8;
 /// A scale is moved by this factor, then by its root.
 const STEPS: [f64; 2] = [2.0, 1.414];
+/// Sets that are fitted to all rows to choose between them, if they come close.
+const FINISHED: usize = 2;
+/// How close that is.
+const CLOSE: f64 = 1.15;
+/// Sets that are fitted to all rows, at most, where none returns less light than it receives.
+const MOST_FINISHED: usize = 4;
+/// Sets whose scales are moved, at most, and how far off these may be at first.
+const MOVED: usize = 3;
+const FAR: f64 = 1.6;
 /// Where every scale begins.
 const FIRST_SCALE: f64 = 0.7;
 
@@ -38,36 +49,62 @@ fn drawn(neurons: usize) -> usize {
 }
 
 pub(super) fn fit(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<BrdfModel> {
-    let link = Link::default_log().fit(values)?;
-    let targets = link.to_targets(values)?;
+    let mut link = Link::default_log().fit(values)?;
     let mut random = ChaCha8Rng::seed_from_u64(tuned.seed);
     random.set_stream(5);
     let wanted = pairs.len().min(2 * SEARCH_ROWS);
     let rows = index::sample(&mut random, pairs.len(), wanted).into_vec();
-    let (fitted, judged) = rows.split_at(wanted / 2);
-    let search = Search {
-        tuned,
-        link: &link,
-        fitted: part(pairs, values, &targets, fitted),
-        judged: part(pairs, values, &targets, judged),
+    let mut settings = Search::new(tuned, &link, pairs, values, &rows)?.best()?;
+    let noise = settings.first().map_or(Vec::new(), Setting::noise);
+    let raised = link.raise_offsets(&noise);
+    if raised.iter().any(|&factor| factor > 1.0) {
+        settings = Search::new(tuned, &link, pairs, values, &rows)?.best()?;
+    }
+    let noisy = raised.iter().any(|&factor| factor > NOISY);
+    let problem = Problem::new(tuned, pairs, values, link, noise, noisy)?;
+    let mut found: Option<Finished> = None;
+    for (number, setting) in settings.iter().enumerate() {
+        let physical = found.as_ref().is_some_and(|found| found.excess <= 0.0);
+        let close = number < FINISHED && setting.error <= CLOSE * settings[0].error;
+        if physical && !close || number >= MOST_FINISHED {
+            continue;
+        }
+        let finished = finished(&problem, setting, &rows)?;
+        found = Some(match found {
+            None => finished,
+            Some(known) => better(known, finished),
+        });
+    }
+    let Some(found) = found else {
+        return Err(no_search());
     };
-    let setting = search.best()?;
+    model_of(&problem, found)
+}
 
-    let x = setting.set.compute_training(pairs);
+fn no_search() -> Error {
+    Error::Elm(elm::Error::NoConvergence {
+        what: "the search for a network",
+    })
+}
+
+/// Draws more neurons than wanted, keeps the most useful, and fits them.
+fn finished(problem: &Problem<'_>, setting: &Setting, rows: &[usize]) -> Result<Finished> {
+    let tuned = problem.tuned;
+    let x = setting.set.compute_training(problem.pairs);
     let scaler = Scaler::measured(&x)?;
-    let neurons = tuned.size(NEURONS, x.ncols(), values.ncols(), 2, drawn)?;
+    let channels = problem.values.ncols();
+    let neurons = tuned.size_of(NEURONS, x.nrows(), x.ncols(), channels, 1, drawn)?;
     let count = drawn(neurons);
     let few = &rows[..rows.len().min(PRUNE_ROWS.max(count))];
     let params = tuned.waves(count, &setting.scales);
     let mut blank = Blank::new(params.clone(), x.ncols(), &scaler)?;
     let params = params.solver(Ridge::relative(RIDGE)).check()?;
-    let weights = row_weights(tuned.metric, pairs, values, &link);
-    let few_weights = weights.as_ref().map(|weights| weights.select(Axis(0), few));
+    let few_weights = problem.weights(few);
     let pruned = params.prune_layer(
         Some(scaler.clone()),
         blank.network.hidden().clone(),
         &x.select(Axis(0), few),
-        &targets.select(Axis(0), few),
+        &problem.targets(few),
         Keep::Neurons(neurons),
         few_weights.as_ref().map(|weights| weights.view()),
     )?;
@@ -76,13 +113,8 @@ pub(super) fn fit(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) ->
         kept[number] = true;
     }
     blank.draw.kept = Some(kept);
-    let hidden = blank.network.hidden().subset(&pruned.kept)?;
-    let weights = weights.as_ref().map(|weights| weights.view());
-    let network = params.fit_layer(Some(scaler), hidden, &x, &targets, weights)?;
-    let mut about = provenance(tuned.seed, tuned.metric, pairs, values);
-    about.held_out = Some(setting.held_out);
-    let layer = Layer::Drawn(vec![blank.draw]);
-    Ok(BrdfModel::new(setting.set, link, layer, network).with_provenance(about))
+    blank.network = without_weights(&scaler, blank.network.hidden().subset(&pruned.kept)?)?;
+    problem.finish(setting.set, &scaler, &[blank], &x)
 }
 
 /// What an error of a row's target is in the metric: to first order
@@ -137,7 +169,21 @@ fn part(
 struct Setting {
     set: Features,
     scales: Vec<f64>,
-    held_out: Metrics,
+    error: f64,
+    /// What is predicted at the rows that judge, and what was measured there.
+    predicted: Array2<f64>,
+    measured: Array2<f64>,
+}
+
+impl Setting {
+    /// The standard deviation of the noise of each channel's dark half, in 1/sr.
+    fn noise(&self) -> Vec<f64> {
+        let columns = self.predicted.columns().into_iter();
+        columns
+            .zip(self.measured.columns())
+            .map(|(predicted, measured)| dark_noise(predicted, measured))
+            .collect()
+    }
 }
 
 struct Search<'a> {
@@ -155,7 +201,25 @@ struct Inputs {
     scaler: Scaler<f64>,
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    /// The first half of `rows` is fitted, the second judges.
+    fn new(
+        tuned: &'a Tuned,
+        link: &'a FittedLink,
+        pairs: &[Pair],
+        values: ArrayView2<'_, f64>,
+        rows: &[usize],
+    ) -> Result<Self> {
+        let targets = link.to_targets(values)?;
+        let (fitted, judged) = rows.split_at(rows.len() / 2);
+        Ok(Self {
+            tuned,
+            link,
+            fitted: part(pairs, values, &targets, fitted),
+            judged: part(pairs, values, &targets, judged),
+        })
+    }
+
     fn inputs(&self, set: Features) -> Result<Inputs> {
         let fitted = set.compute_training(&self.fitted.pairs);
         Ok(Inputs {
@@ -166,48 +230,51 @@ impl Search<'_> {
         })
     }
 
-    /// The set that is best at the first scale of all inputs and its neighbours, with each input's
-    /// scale moved until that no longer pays.
-    fn best(&self) -> Result<Setting> {
-        let sets = self
-            .tuned
-            .sets(&[Features::Highlight, Features::SumDifference]);
-        let mut best: Option<(Inputs, Setting)> = None;
-        for set in sets {
+    /// For every set its best setting: of those that are good at the first scale of all inputs and its
+    /// neighbours, with each input's scale moved until that no longer pays. The best first.
+    fn best(&self) -> Result<Vec<Setting>> {
+        let mut found: Vec<(Inputs, Setting)> = Vec::new();
+        for set in self.tuned.sets() {
             let inputs = self.inputs(set)?;
+            let mut best: Option<Setting> = None;
             for scale in [1.0, 2.0, 0.5].map(|factor| factor * FIRST_SCALE) {
-                let found = self.try_scales(&inputs, vec![scale; inputs.fitted.ncols()])?;
-                if best
-                    .as_ref()
-                    .is_none_or(|(_, best)| self.beats(&found, best))
-                {
-                    best = Some((self.inputs(set)?, found));
+                let tried = self.try_scales(&inputs, vec![scale; inputs.fitted.ncols()])?;
+                if best.as_ref().is_none_or(|best| tried.error < best.error) {
+                    best = Some(tried);
                 }
             }
+            if let Some(best) = best {
+                found.push((inputs, best));
+            }
         }
-        let Some((inputs, mut best)) = best else {
-            let inputs = self.inputs(Features::Highlight)?;
-            return self.try_scales(&inputs, vec![FIRST_SCALE; inputs.fitted.ncols()]);
-        };
-        for step in STEPS {
-            for input in 0..best.scales.len() {
-                for factor in [step, 1.0 / step] {
-                    let mut scales = best.scales.clone();
-                    scales[input] *= factor;
-                    let found = self.try_scales(&inputs, scales)?;
-                    if self.beats(&found, &best) {
-                        best = found;
-                        break;
+        found.sort_by(|(_, a), (_, b)| a.error.total_cmp(&b.error));
+        let least = found.first().map_or(0.0, |(_, best)| best.error);
+        let promising = |(_, setting): &&mut (Inputs, Setting)| setting.error <= FAR * least;
+        for (inputs, best) in found.iter_mut().take(MOVED).filter(promising) {
+            for step in STEPS {
+                for input in 0..best.scales.len() {
+                    for factor in [step, 1.0 / step] {
+                        let mut scales = best.scales.clone();
+                        scales[input] *= factor;
+                        let tried = self.try_scales(inputs, scales)?;
+                        if tried.error < best.error {
+                            *best = tried;
+                            break;
+                        }
                     }
                 }
             }
         }
-        Ok(best)
-    }
-
-    fn beats(&self, one: &Setting, other: &Setting) -> bool {
-        let score = |setting: &Setting| self.tuned.metric.of(&setting.held_out);
-        score(one) < score(other)
+        let mut settings: Vec<Setting> = found.into_iter().map(|(_, best)| best).collect();
+        let handicap = |setting: &Setting| {
+            if setting.set.is_reciprocal() {
+                setting.error
+            } else {
+                TIE * setting.error
+            }
+        };
+        settings.sort_by(|a, b| handicap(a).total_cmp(&handicap(b)));
+        Ok(settings)
     }
 
     fn try_scales(&self, inputs: &Inputs, scales: Vec<f64>) -> Result<Setting> {
@@ -220,12 +287,27 @@ impl Search<'_> {
             &self.fitted.targets,
             None,
         )?;
-        let predicted = self.link.to_values(network.predict(&inputs.judged)?)?;
-        let truth = self.judged.values.view();
+        let targets = network.predict(&inputs.judged)?;
+        let predicted = self.link.to_values(targets.clone())?;
         Ok(Setting {
             set: inputs.set,
             scales,
-            held_out: Metrics::of(&self.judged.pairs, predicted.view(), truth)?,
+            error: self.error(&targets, &predicted)?,
+            predicted,
+            measured: self.judged.values.clone(),
         })
+    }
+
+    /// The metric where that is none that a few bright rows decide; errors of the targets, the largest
+    /// cut off, where RMSE is asked for.
+    fn error(&self, targets: &Array2<f64>, predicted: &Array2<f64>) -> Result<f64> {
+        let metric = self.tuned.metric;
+        if metric != Metric::Rmse {
+            let truth = self.judged.values.view();
+            let metrics = Metrics::of(&self.judged.pairs, predicted.view(), truth)?;
+            return Ok(metric.of(&metrics));
+        }
+        let variances = cut_off_means((targets - &self.judged.targets).mapv(|e| e * e).view());
+        Ok(geometric_root(&variances))
     }
 }

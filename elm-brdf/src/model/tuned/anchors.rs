@@ -1,0 +1,219 @@
+//! What measurements suggest where nothing was measured: a weak pull of a network towards its nearest
+//! measurements, everywhere above the surface.
+//!
+//! A network that meets measurements may do anything between and beyond them: a grid that stops at 60
+//! degrees, or that is in one plane, leaves most of its domain open, and there a small strength of
+//! regularisation lets it swing from black to its ceiling. Anchors are pairs of directions over the whole
+//! hemisphere that take part in the fit as if something had been measured there, namely what the nearest
+//! measurements say: nearest in half angle, difference angle and elevation, on which reflectance depends
+//! most (F. Romeiro, Y. Vasilyev, T. Zickler, *Passive Reflectometry*, ECCV 2008). An anchor counts as
+//! little as that guess is worth: about its variance, as leaving measurements out shows it, against that
+//! of the fit, and less the farther away the nearest measurements are. Next to measurements it says
+//! nothing that they do not say better.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use ndarray::{Array1, Array2, ArrayView2};
+use rand::seq::index;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::geometry::{NORMAL, Pair, cartesian, dot};
+
+/// Anchors laid.
+const ANCHORS: usize = 600;
+/// Measurements that a guess is the mean of.
+const NEAREST: usize = 6;
+/// Measurements listed for each anchor, so that some are left when a fold is left out.
+const LISTED: usize = 24;
+/// Measurements left out to see what guesses are worth.
+const JUDGED: usize = 200;
+
+/// Coordinates in which near means alike.
+fn place(pair: &Pair) -> [f64; 3] {
+    let angles = pair.half_difference();
+    [
+        2.0 * angles.theta_h().sqrt(),
+        angles.theta_d(),
+        0.5 * (pair.incident[2] + pair.outgoing[2]),
+    ]
+}
+
+/// A measurement, and its squared distance.
+type Near = (f64, usize);
+
+/// The measurements by their place.
+pub(super) struct Neighbourhood {
+    places: Vec<[f64; 3]>,
+}
+
+impl Neighbourhood {
+    pub(super) fn new(pairs: &[Pair]) -> Self {
+        Self {
+            places: pairs.iter().map(place).collect(),
+        }
+    }
+
+    /// The nearest measurements but `without`, the nearest first.
+    fn nearest(&self, at: [f64; 3], count: usize, without: Option<usize>) -> Vec<Near> {
+        let mut near: Vec<Near> = Vec::with_capacity(count + 1);
+        for (row, place) in self.places.iter().enumerate() {
+            let distance = (place[0] - at[0]).powi(2)
+                + (place[1] - at[1]).powi(2)
+                + (place[2] - at[2]).powi(2);
+            let full = near.len() == count;
+            if Some(row) == without || full && near.last().is_some_and(|last| distance >= last.0) {
+                continue;
+            }
+            let after = near.partition_point(|known| known.0 <= distance);
+            near.insert(after, (distance, row));
+            near.truncate(count);
+        }
+        near
+    }
+
+    /// The guess for each of `pairs` of what `values`, shape (measurements, channels), are there.
+    pub(super) fn guess(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Array2<f64> {
+        let mut guesses = Array2::zeros((pairs.len(), values.ncols()));
+        for (pair, guess) in pairs.iter().zip(guesses.rows_mut()) {
+            let near = self.nearest(place(pair), NEAREST, None);
+            mean_of(&near, values, guess);
+        }
+        guesses
+    }
+}
+
+/// The mean of the values of `near`, weighted by the inverse of squared distance.
+fn mean_of(near: &[Near], values: ArrayView2<'_, f64>, mut guess: ndarray::ArrayViewMut1<'_, f64>) {
+    // A measurement in the very place must not drown the others beyond what a tenth of the way to
+    // the farthest of them does: they are as noisy as it is.
+    let floor = 1e-2 * near.last().map_or(0.0, |last| last.0) + f64::MIN_POSITIVE;
+    let mut total = 0.0;
+    for &(distance, row) in near {
+        let weight = (floor / (distance + floor)).max(f64::MIN_POSITIVE);
+        guess.scaled_add(weight, &values.row(row));
+        total += weight;
+    }
+    if total > 0.0 {
+        guess /= total;
+    }
+}
+
+/// The anchors of a set of measurements.
+pub(super) struct Anchors {
+    /// Where they are.
+    pub(super) pairs: Vec<Pair>,
+    near: Vec<Vec<Near>>,
+    /// Squared distance between each of some measurements and its nearest others, with these.
+    judged: Vec<(usize, Vec<Near>)>,
+}
+
+impl Anchors {
+    pub(super) fn new(neighbourhood: &Neighbourhood, seed: u64) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream(9);
+        let pairs = scatter(&mut random);
+        let near = pairs.iter().map(place);
+        let near = near.map(|at| neighbourhood.nearest(at, LISTED, None));
+        let rows = neighbourhood.places.len();
+        let judged = index::sample(&mut random, rows, JUDGED.min(rows));
+        let judged = judged.into_iter().map(|row| {
+            let at = neighbourhood.places[row];
+            (row, neighbourhood.nearest(at, NEAREST, Some(row)))
+        });
+        Self {
+            near: near.collect(),
+            judged: judged.collect(),
+            pairs,
+        }
+    }
+
+    /// What measurements of which `is_there` say at each anchor, shape (anchors, channels).
+    pub(super) fn targets(
+        &self,
+        targets: ArrayView2<'_, f64>,
+        is_there: impl Fn(usize) -> bool,
+    ) -> Array2<f64> {
+        let mut guesses = Array2::zeros((self.pairs.len(), targets.ncols()));
+        for (near, guess) in self.near.iter().zip(guesses.rows_mut()) {
+            let there = near.iter().copied().filter(|&(_, row)| is_there(row));
+            let there: Vec<Near> = there.take(NEAREST).collect();
+            // All of them left out: better than nothing are those themselves.
+            let there = if there.is_empty() { near } else { &there };
+            mean_of(there, targets, guess);
+        }
+        guesses
+    }
+
+    /// How much each anchor counts as a row of the fit, of which the targets of each channel have the
+    /// variance `variances` about the network.
+    pub(super) fn weights(&self, targets: ArrayView2<'_, f64>, variances: &[f64]) -> Array1<f64> {
+        let (mut squares, mut distances) = (0.0, 0.0);
+        for (row, near) in &self.judged {
+            let mut guess = Array1::zeros(targets.ncols());
+            mean_of(near, targets, guess.view_mut());
+            let errors = (&guess - &targets.row(*row)).into_iter();
+            let relative = errors.zip(variances).map(|(e, v)| e * e / v.max(1e-300));
+            squares += relative.sum::<f64>() / variances.len() as f64;
+            distances += near.first().map_or(0.0, |nearest| nearest.0);
+        }
+        let count = self.judged.len().max(1) as f64;
+        let (squares, usual) = ((squares / count).max(1.0), distances / count);
+        let weight = |near: &Vec<Near>| {
+            let distance = near.first().map_or(0.0, |nearest| nearest.0);
+            let farther = if usual > 0.0 {
+                (distance / usual).max(1.0)
+            } else {
+                1.0
+            };
+            1.0 / (squares * farther)
+        };
+        self.near.iter().map(weight).collect()
+    }
+}
+
+/// Pairs of directions over the hemisphere: half of them anywhere by both angles, half by the half
+/// vector, near the mirror direction.
+fn scatter(random: &mut ChaCha8Rng) -> Vec<Pair> {
+    let mut pairs = Vec::with_capacity(ANCHORS);
+    while pairs.len() < ANCHORS {
+        if pairs.len() % 2 == 0 {
+            let mut theta = || random.random_range(0.0..FRAC_PI_2);
+            let (theta_i, theta_o) = (theta(), theta());
+            pairs.push(Pair {
+                incident: cartesian(theta_i, 0.0),
+                outgoing: cartesian(theta_o, random.random_range(0.0..PI)),
+            });
+            continue;
+        }
+        let part: f64 = random.random_range(0.0..1.0);
+        let half = cartesian(FRAC_PI_2 * part * part, 0.0);
+        let light = cartesian(
+            random.random_range(0.0..FRAC_PI_2),
+            random.random_range(0.0..TAU),
+        );
+        // The light turned from the normal to the half vector, then mirrored about that.
+        let incident = about(half, light);
+        let along = 2.0 * dot(incident, half);
+        let outgoing = [0, 1, 2].map(|axis| along * half[axis] - incident[axis]);
+        let pair = Pair { incident, outgoing };
+        // Half vectors that tilt far have few lights: the others stand for these too.
+        pairs.push(if pair.is_above_horizon() {
+            pair
+        } else {
+            let theta = random.random_range(0.0..FRAC_PI_2);
+            Pair {
+                incident: cartesian(theta, 0.0),
+                outgoing: cartesian(theta, PI * (1.0 - part * part)),
+            }
+        });
+    }
+    pairs
+}
+
+/// A direction given about the normal, about `axis` (in the plane y = 0) instead.
+fn about(axis: [f64; 3], direction: [f64; 3]) -> [f64; 3] {
+    let (sin, cos) = (axis[0], dot(axis, NORMAL));
+    let [x, y, z] = direction;
+    [cos * x + sin * z, y, cos * z - sin * x]
+}

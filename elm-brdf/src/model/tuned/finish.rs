@@ -1,0 +1,437 @@
+//! The last step of every fit: output weights for a layer that is there, by a strength that
+//! cross-validation chooses, and a look at what came of it.
+//!
+//! The strength makes small the error on rows that were left out, with the error added that single
+//! precision would make: an exported network is evaluated in `f32`, where output weights that cancel
+//! each other leave noise. [Anchors](super::anchors) say what happens where nothing was measured; while the
+//! network returns more light than it receives, and than its measurements do by their nearest
+//! neighbours, they count for more.
+
+use elm::{Elm, HiddenLayer, Scaler};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Slice};
+use rand::SeedableRng;
+use rand::seq::index;
+use rand_chacha::ChaCha8Rng;
+
+use super::anchors::{Anchors, Neighbourhood};
+use super::censored::Censored;
+use super::many::row_weights;
+use super::moments::{WEAKEST, Weights, rounding};
+use super::rows::{Pull, Rows, STRENGTHS, TILE};
+use super::survey::Survey;
+use super::{Blank, Tuned};
+use crate::error::{Error, Result};
+use crate::features::Features;
+use crate::geometry::Pair;
+use crate::link::FittedLink;
+use crate::metrics::{Metric, Metrics};
+use crate::model::Layer;
+
+/// Folds of the cross-validation.
+const FOLDS: usize = 5;
+/// Rows that are left out in turn, at most.
+const JUDGED: usize = 6_000;
+/// Measurements that guesses are made from, at most.
+const KNOWN: usize = 4_000;
+/// The squared error that rounding makes counts so many times: what is exported is to be better
+/// than what rounding alone leaves.
+const ROUNDING: f64 = 25.0;
+/// Of the errors the largest are cut off at this quantile, lest a few rows decide.
+const QUANTILE: f64 = 0.99;
+/// While the albedo is not physical they count ten times as much, so many times.
+const STEPS: usize = 4;
+/// Rounds of working residuals end where targets move by a two-thousandth of their size.
+const CONVERGED: f64 = 2.5e-7;
+
+/// Measurements to be fitted, for all sets of inputs.
+pub(super) struct Problem<'a> {
+    pub(super) tuned: &'a Tuned,
+    pub(super) pairs: &'a [Pair],
+    pub(super) values: ArrayView2<'a, f64>,
+    pub(super) link: FittedLink,
+    /// Standard deviation of the noise of each channel's dark values, in 1/sr.
+    noise: Vec<f64>,
+    /// Whether that is as large as values are.
+    noisy: bool,
+    targets: Array2<f64>,
+    weights: Option<Array1<f64>>,
+    /// The rows that are left out in turn, fold by fold.
+    folds: Vec<Vec<usize>>,
+    /// All rows of the folds, in their order.
+    judged: Vec<usize>,
+    judged_pairs: Vec<Pair>,
+    /// The measurements that guesses are made from, as places among the judged.
+    known: Vec<usize>,
+    neighbourhood: Neighbourhood,
+    anchors: Anchors,
+    survey: Survey,
+}
+
+/// What a layer came to.
+pub(super) struct Finished {
+    pub(super) features: Features,
+    pub(super) layer: Layer,
+    pub(super) network: Elm<f64>,
+    pub(super) held_out: Option<Metrics>,
+    /// The error on rows left out, by which layers are compared.
+    pub(super) score: f64,
+    /// By how much the albedo is above what it may be, 0 where it is not.
+    pub(super) excess: f64,
+}
+
+impl<'a> Problem<'a> {
+    pub(super) fn new(
+        tuned: &'a Tuned,
+        pairs: &'a [Pair],
+        values: ArrayView2<'a, f64>,
+        link: FittedLink,
+        noise: Vec<f64>,
+        noisy: bool,
+    ) -> Result<Self> {
+        let mut random = ChaCha8Rng::seed_from_u64(tuned.seed);
+        random.set_stream(8);
+        let rows = pairs.len();
+        let judged = index::sample(&mut random, rows, rows.min(JUDGED)).into_vec();
+        let count = FOLDS.min(rows);
+        let folds: Vec<Vec<usize>> = (0..count)
+            .map(|fold| judged.iter().copied().skip(fold).step_by(count).collect())
+            .collect();
+        let judged: Vec<usize> = folds.concat();
+        let judged_pairs: Vec<Pair> = judged.iter().map(|&row| pairs[row]).collect();
+        let known: Vec<usize> = (0..judged.len())
+            .step_by(judged.len().div_ceil(KNOWN).max(1))
+            .collect();
+        let known_pairs: Vec<Pair> = known.iter().map(|&place| judged_pairs[place]).collect();
+        let neighbourhood = Neighbourhood::new(&known_pairs);
+        Ok(Self {
+            targets: link.to_targets(values)?,
+            weights: row_weights(tuned.metric, pairs, values, &link),
+            anchors: Anchors::new(&neighbourhood, tuned.seed),
+            survey: Survey::new(),
+            tuned,
+            pairs,
+            values,
+            link,
+            noise,
+            noisy,
+            folds,
+            judged,
+            judged_pairs,
+            known,
+            neighbourhood,
+        })
+    }
+
+    /// Fits the output weights of the layers of `blanks` together; `x` has the inputs of all rows.
+    pub(super) fn finish(
+        &self,
+        features: Features,
+        scaler: &Scaler<f64>,
+        blanks: &[Blank],
+        x: &Array2<f64>,
+    ) -> Result<Finished> {
+        let layers = blanks.iter().map(|blank| blank.network.hidden().clone());
+        let hidden = HiddenLayer::joined(&layers.collect::<Vec<_>>())?;
+        let blank = super::without_weights(scaler, hidden.clone())?;
+        let reach = reach(&hidden);
+        let rows = Rows::new(self, &blank, x)?;
+        let (strength, held_out) = self.strength(&rows, &reach, None, (2..STRENGTHS).step_by(2))?;
+        let at_anchors = blank.hidden_matrix(&features.compute(&self.anchors.pairs))?;
+        let mut pull = Pull::new(self, at_anchors, &self.variances(&held_out));
+        let mut best = None;
+        for _ in 0..=STEPS {
+            let near = rows.near(strength);
+            let (strength, held_out) = self.strength(&rows, &reach, Some(&pull), near)?;
+            let weights = self.solve(&rows, &blank, x, strength, &pull)?;
+            let network = Elm::from_parts(
+                Some(scaler.clone()),
+                hidden.clone(),
+                weights.beta,
+                weights.intercept,
+            )?;
+            let excess = self.survey.excess(self, features, &network)?;
+            let better = |&(_, _, known): &(_, _, f64)| excess < known;
+            if best.as_ref().is_none_or(better) {
+                best = Some((network, held_out, excess));
+            }
+            if excess <= 0.0 {
+                break;
+            }
+            pull.times *= 10.0;
+        }
+        let Some((network, held_out, excess)) = best else {
+            return Err(no_fit());
+        };
+        let draws = blanks.iter().map(|blank| blank.draw.clone()).collect();
+        Ok(Finished {
+            features,
+            layer: Layer::Drawn(draws),
+            network,
+            score: self.score(&held_out)?,
+            held_out: self.metrics(&held_out)?,
+            excess,
+        })
+    }
+
+    /// The targets of some rows.
+    pub(super) fn targets(&self, rows: &[usize]) -> Array2<f64> {
+        self.targets.select(Axis(0), rows)
+    }
+
+    /// What the metric makes of errors at some rows, where it makes anything of them.
+    pub(super) fn weights(&self, rows: &[usize]) -> Option<Array1<f64>> {
+        let weights = self.weights.as_ref();
+        weights.map(|weights| weights.select(Axis(0), rows))
+    }
+
+    fn metrics(&self, held_out: &Array2<f64>) -> Result<Option<Metrics>> {
+        if self.folds.len() < 2 {
+            return Ok(None);
+        }
+        let predicted = self.link.to_values(held_out.clone())?;
+        let values = self.values.select(Axis(0), &self.judged);
+        Metrics::of(&self.judged_pairs, predicted.view(), values.view()).map(Some)
+    }
+
+    /// Errors of targets where RMSE is asked for: all rows count alike, where a few bright ones
+    /// would decide the RMSE itself. The metric itself otherwise.
+    fn score(&self, held_out: &Array2<f64>) -> Result<f64> {
+        let metric = self.tuned.metric;
+        if metric == Metric::Rmse {
+            return Ok(geometric_root(&self.variances(held_out)));
+        }
+        let metrics = self.metrics(held_out)?;
+        Ok(metrics.map_or(0.0, |metrics| metric.of(&metrics)))
+    }
+
+    /// The mean squared error of each channel's targets, the largest cut off.
+    fn variances(&self, held_out: &Array2<f64>) -> Vec<f64> {
+        let targets = self.targets(&self.judged);
+        let mut squares = (held_out - &targets).mapv_into(|error| error * error);
+        if let Some(weights) = self.weights(&self.judged) {
+            squares *= &weights.insert_axis(Axis(1));
+        }
+        cut_off_means(squares.view())
+    }
+
+    /// Predictions of the targets of all judged rows, each by the fit without its fold.
+    fn held_out(
+        &self,
+        rows: &Rows,
+        strength: f64,
+        pull: Option<&Pull>,
+    ) -> Option<(Array2<f64>, Weights)> {
+        let mut predicted = Array2::zeros((self.judged.len(), self.targets.ncols()));
+        let mut first = 0;
+        let mut whole = None;
+        for (number, fold) in self.folds.iter().enumerate() {
+            let mut left = rows.total.clone();
+            if self.folds.len() > 1 {
+                left.add(&rows.folds[number], -1.0);
+            }
+            if let Some(pull) = pull {
+                left.add(&pull.without[number], pull.times);
+            }
+            let weights = left.factor(strength)?.solve(&left);
+            let range = Slice::from(first..first + fold.len());
+            let fitted = weights.apply(rows.judged.slice_axis(Axis(0), range));
+            predicted.slice_axis_mut(Axis(0), range).assign(&fitted);
+            first += fold.len();
+            whole = Some(weights);
+        }
+        whole.map(|weights| (predicted, weights))
+    }
+
+    /// Of the strengths of these steps the one with the least error on rows left out, and what is
+    /// predicted for these.
+    fn strength(
+        &self,
+        rows: &Rows,
+        reach: &Array1<f64>,
+        pull: Option<&Pull>,
+        steps: impl Iterator<Item = usize>,
+    ) -> Result<(f64, Array2<f64>)> {
+        let spread: Vec<f64> = self
+            .targets
+            .columns()
+            .into_iter()
+            .map(|t| t.var(0.0).max(1e-300))
+            .collect();
+        let mut tried: Vec<(f64, f64, Array2<f64>)> = Vec::new();
+        for step in steps {
+            let strength = rows.scale * WEAKEST * 10_f64.powf(step as f64 / 2.0);
+            let Some((held_out, weights)) = self.held_out(rows, strength, pull) else {
+                continue;
+            };
+            let errors = self.variances(&held_out);
+            let rounded = rounding(weights.beta.view(), reach.view());
+            let score: f64 = errors
+                .iter()
+                .zip(&rounded)
+                .zip(&spread)
+                .map(|((error, rounded), spread)| (error + ROUNDING * rounded.powi(2)) / spread)
+                .sum();
+            if score.is_finite() {
+                tried.push((score, strength, held_out));
+            }
+        }
+        let by_score = |&a: &usize, &b: &usize| tried[a].0.total_cmp(&tried[b].0);
+        let mut chosen = (0..tried.len()).min_by(by_score).ok_or_else(no_fit)?;
+        if self.noisy {
+            chosen = self.strongest_as_good(&tried, chosen, &spread);
+        }
+        let (_, strength, held_out) = tried.swap_remove(chosen);
+        Ok((strength, held_out))
+    }
+
+    /// Of the strengths above the best one the largest whose errors are not surely larger: by no more
+    /// than the standard error of their mean difference. Where noise is as large as values, the
+    /// difference between a slope and none is often luck.
+    fn strongest_as_good(
+        &self,
+        tried: &[(f64, f64, Array2<f64>)],
+        best: usize,
+        spread: &[f64],
+    ) -> usize {
+        let targets = self.targets(&self.judged);
+        let squares = |held_out: &Array2<f64>| -> Array1<f64> {
+            let errors = (held_out - &targets).mapv_into(|error| error * error);
+            errors.dot(&Array1::from_iter(spread.iter().map(|spread| 1.0 / spread)))
+        };
+        let least = squares(&tried[best].2);
+        let as_good = |place: &usize| {
+            let more = squares(&tried[*place].2) - &least;
+            let mean = more.mean().unwrap_or(0.0);
+            mean <= more.std(0.0) / (more.len() as f64).sqrt()
+        };
+        (best..tried.len()).rev().find(as_good).unwrap_or(best)
+    }
+
+    /// The rows that are left out in turn, fold by fold.
+    pub(super) fn folds(&self) -> &[Vec<usize>] {
+        &self.folds
+    }
+
+    /// All rows of the folds, in their order.
+    pub(super) fn judged(&self) -> &[usize] {
+        &self.judged
+    }
+
+    /// The rows that guesses are made from.
+    fn known_rows(&self) -> Vec<usize> {
+        self.known.iter().map(|&place| self.judged[place]).collect()
+    }
+
+    /// What the nearest measurements say of the targets at any pairs.
+    pub(super) fn neighbours_guess(&self, pairs: &[Pair]) -> Array2<f64> {
+        let targets = self.targets(&self.known_rows());
+        self.neighbourhood.guess(pairs, targets.view())
+    }
+
+    /// What anchors count where the targets have these variances about a network.
+    pub(super) fn anchor_weights(&self, variances: &[f64]) -> Array1<f64> {
+        let targets = self.targets(&self.known_rows());
+        self.anchors.weights(targets.view(), variances)
+    }
+
+    /// What the targets suggest at each anchor, by the rows in a place among the judged of which
+    /// `is_there`.
+    pub(super) fn guesses_of_targets(&self, is_there: impl Fn(usize) -> bool) -> Array2<f64> {
+        self.guesses(&self.targets, is_there)
+    }
+
+    /// What `targets`, of all rows, suggest at each anchor, by the known rows that are in a place among
+    /// the judged of which `is_there`.
+    fn guesses(&self, targets: &Array2<f64>, is_there: impl Fn(usize) -> bool) -> Array2<f64> {
+        let targets = targets.select(Axis(0), &self.known_rows());
+        self.anchors
+            .targets(targets.view(), |known| is_there(self.known[known]))
+    }
+
+    /// The output weights for all rows.
+    ///
+    /// The mean of a logarithm is not the logarithm of the mean: noise makes a network of mean targets
+    /// too dark, the more, the darker the rows. Where the RMSE is asked for, residuals are therefore
+    /// taken of the values, $(y - f) / (f + o)$, instead of the targets, $\ln (y + o) - \ln(f + o)$,
+    /// whose mean is 0 where $f$ is the mean of $y$: the estimating equations of a regression with
+    /// logarithmic link whose deviation is proportional to $f + o$ (R. Wedderburn, *Quasi-Likelihood
+    /// Functions, Generalized Linear Models, and the Gauss-Newton Method*, Biometrika 61(3), 1974),
+    /// solved by the same factorisation.
+    fn solve(
+        &self,
+        rows: &Rows,
+        blank: &Elm<f64>,
+        x: &Array2<f64>,
+        strength: f64,
+        pull: &Pull,
+    ) -> Result<Weights> {
+        let mut all = rows.total.clone();
+        all.add(&pull.all, pull.times);
+        let factor = all.factor(strength).ok_or_else(no_fit)?;
+        let mut weights = factor.solve(&all);
+        if self.tuned.metric != Metric::Rmse {
+            return Ok(weights);
+        }
+        let mut censored = Censored::new(self.values, &self.noise);
+        for _ in 0..censored.rounds() {
+            let mut z = Array2::zeros(self.targets.dim());
+            let mut moved = rows.total.without_targets();
+            for first in (0..x.nrows()).step_by(TILE) {
+                let tile = Slice::from(first..(first + TILE).min(x.nrows()));
+                let h = blank.hidden_matrix(&x.slice_axis(Axis(0), tile))?;
+                let fitted = weights.apply(h.view());
+                let values = self.values.slice_axis(Axis(0), tile);
+                let means = self.link.to_values(fitted.clone())?;
+                let values = censored.completed(values, means.view());
+                let working = self.link.working_targets(fitted.view(), values.view())?;
+                moved.add_cross(&rows.total.again(&h, &working, None), 1.0);
+                z.slice_axis_mut(Axis(0), tile).assign(&working);
+            }
+            let guesses = self.guesses(&z, |_| true);
+            moved.add_cross(
+                &pull.all.again(&pull.h, &guesses, Some(&pull.weights)),
+                pull.times,
+            );
+            let before = weights.apply(rows.judged.view());
+            weights = factor.solve(&moved);
+            let after = weights.apply(rows.judged.view());
+            // What the noise moves, not what the rows say.
+            let moved = (&after - &before).mapv_into(|d| d * d).sum();
+            if moved <= CONVERGED * before.mapv(|t| t * t).sum() {
+                break;
+            }
+            censored.learn();
+        }
+        Ok(weights)
+    }
+}
+
+pub(super) fn no_fit() -> Error {
+    Error::Elm(elm::Error::NoConvergence {
+        what: "the search for a strength of regularisation",
+    })
+}
+
+/// The size of the sum that each neuron's function is applied to, of standardised inputs.
+fn reach(hidden: &HiddenLayer<f64>) -> Array1<f64> {
+    let squares = hidden.weights().mapv(|w| w * w).sum_axis(Axis(0));
+    (squares + hidden.biases().mapv(|b| b * b)).mapv(f64::sqrt)
+}
+
+/// The mean of each column of squared errors, the largest cut off.
+pub(super) fn cut_off_means(squares: ArrayView2<'_, f64>) -> Vec<f64> {
+    let mean = |column: ArrayView1<'_, f64>| {
+        let mut sorted = column.to_vec();
+        let place = (sorted.len() as f64 * QUANTILE).ceil() as usize;
+        let place = place.clamp(1, sorted.len()) - 1;
+        let most = *sorted.select_nth_unstable_by(place, f64::total_cmp).1;
+        column.iter().map(|&square| square.min(most)).sum::<f64>() / column.len() as f64
+    };
+    squares.columns().into_iter().map(mean).collect()
+}
+
+/// The geometric mean of the roots.
+pub(super) fn geometric_root(variances: &[f64]) -> f64 {
+    let logs = variances.iter().map(|variance| variance.max(1e-300).ln());
+    (0.5 * logs.sum::<f64>() / variances.len() as f64).exp()
+}

@@ -1,0 +1,365 @@
+//! Sums of products of a hidden-layer matrix and its targets: what a search over strengths of
+//! regularisation, and over folds, needs of the rows.
+//!
+//! Sums of folds add up and are taken away again, so that a cross-validation reads every row once. The
+//! normal equations lose half of the digits, which for the strengths that a model evaluated in single
+//! precision can bear (see [`rounding`]) leaves enough.
+
+use ndarray::linalg::general_mat_mul;
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Slice};
+
+/// The weakest strength, relative to the sum of the columns' squares: below, the normal equations have
+/// no digits.
+pub(super) const WEAKEST: f64 = 1e-12;
+/// Rows of a block of the factorisation.
+const BLOCK: usize = 48;
+
+/// Sums of products of the columns of a hidden-layer matrix, of a constant, and of the targets.
+#[derive(Debug, Clone)]
+pub(super) struct Moments {
+    /// Of the hidden columns and the constant, shape (neurons + 1, neurons + 1); on and below the
+    /// diagonal.
+    gram: Array2<f64>,
+    /// Of these with the targets, shape (neurons + 1, outputs).
+    cross: Array2<f64>,
+    /// Of the targets with themselves.
+    squares: Array1<f64>,
+    rows: usize,
+}
+
+/// Output weights, and what they leave.
+#[derive(Debug, Clone)]
+pub(super) struct Weights {
+    /// Shape (neurons, outputs).
+    pub(super) beta: Array2<f64>,
+    pub(super) intercept: Array1<f64>,
+}
+
+impl Weights {
+    pub(super) fn apply(&self, h: ArrayView2<'_, f64>) -> Array2<f64> {
+        h.dot(&self.beta) + &self.intercept
+    }
+}
+
+impl Moments {
+    /// `h` has shape (rows, neurons), `t` (rows, outputs); `weights` are those of squares.
+    pub(super) fn of(
+        h: ArrayView2<'_, f64>,
+        t: ArrayView2<'_, f64>,
+        weights: Option<&Array1<f64>>,
+    ) -> Self {
+        let (rows, neurons) = h.dim();
+        let mut bordered = Array2::ones((rows, neurons + 1));
+        bordered
+            .slice_axis_mut(Axis(1), Slice::from(..neurons))
+            .assign(&h);
+        let weighted = weights.map(|weights| &bordered * &weights.view().insert_axis(Axis(1)));
+        let left = weighted.as_ref().unwrap_or(&bordered).t();
+        let squares = t.columns().into_iter().map(|t| match weights {
+            None => t.dot(&t),
+            Some(weights) => t.iter().zip(weights).map(|(t, w)| w * t * t).sum(),
+        });
+        Self {
+            gram: lower_product(left, bordered.view()),
+            cross: left.dot(&t),
+            squares: squares.collect(),
+            rows,
+        }
+    }
+
+    /// The same rows with other targets; `h` and `weights` must be those that these were made of.
+    pub(super) fn again(
+        &self,
+        h: &Array2<f64>,
+        t: &Array2<f64>,
+        weights: Option<&Array1<f64>>,
+    ) -> Self {
+        let weighted = weights.map(|weights| t * &weights.view().insert_axis(Axis(1)));
+        let weighted = weighted.as_ref().unwrap_or(t);
+        let mut cross = Array2::zeros((h.ncols() + 1, t.ncols()));
+        let mut hidden = cross.slice_axis_mut(Axis(0), Slice::from(..h.ncols()));
+        hidden.assign(&h.t().dot(weighted));
+        cross.row_mut(h.ncols()).assign(&weighted.sum_axis(Axis(0)));
+        let squares = t.columns().into_iter().zip(weighted.columns());
+        Self {
+            gram: self.gram.clone(),
+            cross,
+            squares: squares.map(|(t, weighted)| t.dot(&weighted)).collect(),
+            rows: self.rows,
+        }
+    }
+
+    /// The same hidden columns, and nothing of the targets.
+    pub(super) fn without_targets(&self) -> Self {
+        Self {
+            gram: self.gram.clone(),
+            cross: Array2::zeros(self.cross.dim()),
+            squares: Array1::zeros(self.squares.len()),
+            rows: self.rows,
+        }
+    }
+
+    /// Adds what is of the targets so many times.
+    pub(super) fn add_cross(&mut self, other: &Self, times: f64) {
+        self.cross.scaled_add(times, &other.cross);
+        self.squares.scaled_add(times, &other.squares);
+    }
+
+    /// Adds `other` so many times; -1 takes it away.
+    pub(super) fn add(&mut self, other: &Self, times: f64) {
+        self.gram.scaled_add(times, &other.gram);
+        self.cross.scaled_add(times, &other.cross);
+        self.squares.scaled_add(times, &other.squares);
+        if times < 0.0 {
+            self.rows = self.rows.saturating_sub(other.rows);
+        } else {
+            self.rows += other.rows;
+        }
+    }
+
+    /// The sum of the squares of all hidden columns about their means, which strengths are relative
+    /// to; 1 where none varies.
+    pub(super) fn scale(&self) -> f64 {
+        let neurons = self.gram.nrows() - 1;
+        let total = self.gram[[neurons, neurons]];
+        let about_mean =
+            |k: usize| (self.gram[[k, k]] - self.gram[[neurons, k]].powi(2) / total).max(0.0);
+        let sum: f64 = (0..neurons).map(about_mean).sum();
+        if sum > 0.0 && sum.is_finite() {
+            sum
+        } else {
+            1.0
+        }
+    }
+
+    /// The triangle for a strength that is added to the squares of all columns but the constant;
+    /// `None` where rounding has made them indefinite.
+    pub(super) fn factor(&self, strength: f64) -> Option<Factor> {
+        let neurons = self.gram.nrows() - 1;
+        let mut lower = self.gram.clone();
+        for k in 0..neurons {
+            lower[[k, k]] += strength;
+        }
+        cholesky(&mut lower).then_some(Factor { lower, strength })
+    }
+}
+
+/// A factorised problem.
+pub(super) struct Factor {
+    lower: Array2<f64>,
+    strength: f64,
+}
+
+impl Factor {
+    /// The output weights for the targets of `moments`, whose triangle this is.
+    pub(super) fn solve(&self, moments: &Moments) -> Weights {
+        let mut x = moments.cross.clone();
+        let n = self.lower.nrows();
+        forward(&self.lower, &mut x);
+        for row in (0..n).rev() {
+            let (mut head, tail) = x.view_mut().split_at(Axis(0), row + 1);
+            let mut this = head.row_mut(row);
+            let column = self.lower.column(row);
+            this -= &column
+                .slice_axis(Axis(0), Slice::from(row + 1..))
+                .dot(&tail);
+            this /= self.lower[[row, row]];
+        }
+        let intercept = x.row(n - 1).to_owned();
+        Weights {
+            beta: x.slice_axis(Axis(0), Slice::from(..n - 1)).to_owned(),
+            intercept,
+        }
+    }
+
+    /// The logarithm of each output's evidence up to a constant of the rows and outputs, by the
+    /// formula of
+    /// [`log_evidence`](elm::validate::Validator::log_evidence).
+    pub(super) fn evidence(&self, moments: &Moments) -> Vec<f64> {
+        let n = self.lower.nrows();
+        let mut y = moments.cross.clone();
+        forward(&self.lower, &mut y);
+        let complexity: f64 = 2.0 * self.lower.diag().iter().map(|d| d.ln()).sum::<f64>()
+            - (n - 1) as f64 * self.strength.ln();
+        let rows = moments.rows.saturating_sub(1).max(1) as f64;
+        let columns = y.columns().into_iter().zip(&moments.squares);
+        columns
+            .map(|(y, squares)| {
+                let variance = ((squares - y.dot(&y)) / rows).max(squares * 1e-15);
+                -0.5 * (rows * variance.ln() + complexity)
+            })
+            .collect()
+    }
+}
+
+/// The product of `left` and `right` on and below its diagonal, block by block; above it is anything.
+fn lower_product(left: ArrayView2<'_, f64>, right: ArrayView2<'_, f64>) -> Array2<f64> {
+    let n = right.ncols();
+    let mut product = Array2::zeros((n, n));
+    for first in (0..n).step_by(2 * BLOCK) {
+        let columns = Slice::from(first..(first + 2 * BLOCK).min(n));
+        let mut target = product.slice_axis_mut(Axis(1), columns);
+        target.slice_axis_inplace(Axis(0), Slice::from(first..));
+        let rows = left.slice_axis(Axis(0), Slice::from(first..));
+        let columns = right.slice_axis(Axis(1), columns);
+        general_mat_mul(1.0, &rows, &columns, 0.0, &mut target);
+    }
+    product
+}
+
+/// Solves $L y = b$ in place of `b`.
+fn forward(lower: &Array2<f64>, b: &mut Array2<f64>) {
+    for row in 0..lower.nrows() {
+        let (head, mut tail) = b.view_mut().split_at(Axis(0), row);
+        let mut this = tail.row_mut(0);
+        this -= &lower
+            .row(row)
+            .slice_axis(Axis(0), Slice::from(..row))
+            .dot(&head);
+        this /= lower[[row, row]];
+    }
+}
+
+/// Overwrites the lower triangle of a symmetric matrix by its Cholesky factor; whether it has one.
+fn cholesky(a: &mut Array2<f64>) -> bool {
+    let n = a.nrows();
+    for first in (0..n).step_by(BLOCK) {
+        let width = BLOCK.min(n - first);
+        // What the blocks before take away of all rows from here on.
+        if first > 0 {
+            let (done, open) = a.view_mut().split_at(Axis(1), first);
+            let rows = done.slice_axis(Axis(0), Slice::from(first..));
+            let block = done.slice_axis(Axis(0), Slice::from(first..first + width));
+            let mut target = open;
+            target.slice_axis_inplace(Axis(0), Slice::from(first..));
+            target.slice_axis_inplace(Axis(1), Slice::from(..width));
+            general_mat_mul(-1.0, &rows, &block.t(), 1.0, &mut target);
+        }
+        let Some(entries) = a.as_slice_mut() else {
+            return false;
+        };
+        for row in first..n {
+            let (above, this) = entries.split_at_mut(row * n);
+            let this = &mut this[first..first + width];
+            for column in 0..width.min(row - first + 1) {
+                let (known, open) = this.split_at_mut(column);
+                let other = if first + column == row {
+                    &*known
+                } else {
+                    let start = (first + column) * n + first;
+                    &above[start..start + column]
+                };
+                let taken: f64 = known.iter().zip(other).map(|(a, b)| a * b).sum();
+                let rest = open[0] - taken;
+                open[0] = if first + column == row {
+                    if rest <= 0.0 || rest.is_nan() {
+                        return false;
+                    }
+                    rest.sqrt()
+                } else {
+                    rest / above[(first + column) * n + first + column]
+                };
+            }
+        }
+    }
+    true
+}
+
+/// How far single precision may move a prediction, as a standard deviation for each output: half an
+/// ulp of the largest value that a neuron has and of the sum that it is applied to, of which each
+/// is as likely to be high as low.
+///
+/// `reach` has, for each neuron, the size of the sum that its function is applied to.
+pub(super) fn rounding(beta: ArrayView2<'_, f64>, reach: ArrayView1<'_, f64>) -> Vec<f64> {
+    let u = f64::from(f32::EPSILON) / 2.0;
+    let of = |column: ArrayView1<'_, f64>| {
+        let sum: f64 = column
+            .iter()
+            .zip(reach)
+            .map(|(beta, reach)| (beta * (1.0 + reach)).powi(2))
+            .sum();
+        u * sum.sqrt()
+    };
+    beta.columns().into_iter().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_abs_diff_eq;
+    use elm::solve::LeastSquares;
+    use elm::validate::Validator;
+
+    fn problem(rows: usize, neurons: usize) -> (Array2<f64>, Array2<f64>) {
+        let h = Array2::from_shape_fn((rows, neurons), |(i, j)| {
+            ((i as f64 * 0.37 + 1.0) * (j as f64 * 0.11 + 0.3)).sin()
+        });
+        let t = Array2::from_shape_fn((rows, 2), |(i, j)| {
+            (i as f64 * 0.05 * (j + 1) as f64).cos() + 3.0
+        });
+        (h, t)
+    }
+
+    /// The library's own solver, by singular values, is the truth.
+    #[test]
+    fn weights_and_evidence_are_those_of_the_singular_value_decomposition() {
+        for (rows, neurons) in [(150, 101), (60, 101)] {
+            let (h, t) = problem(rows, neurons);
+            let moments = Moments::of(h.view(), t.view(), None);
+            let validator =
+                Validator::new(&LeastSquares::new(&h, &t).unwrap().intercept(true)).unwrap();
+            // The same absolute strength; the library's are relative to the largest singular value.
+            let about_means = &h - &h.mean_axis(Axis(0)).unwrap();
+            let gram = about_means.t().dot(&about_means);
+            let mut vector = Array1::ones(neurons);
+            for _ in 0..2000 {
+                vector = gram.dot(&vector);
+                vector /= vector.dot(&vector).sqrt();
+            }
+            let largest = vector.dot(&gram.dot(&vector));
+            let mut differences = Vec::new();
+            for relative in [1e-6, 1e-3] {
+                let factor = moments.factor(relative * largest).unwrap();
+                let solution = validator.solve(&[relative]).unwrap();
+                let weights = factor.solve(&moments);
+                let predicted = weights.apply(h.view());
+                let expected = h.dot(&solution.beta) + &solution.intercept;
+                assert_abs_diff_eq!(predicted, expected, epsilon = 1e-7);
+                let evidence = validator.log_evidence(&[relative]).unwrap();
+                differences.push(factor.evidence(&moments)[1] - evidence[1]);
+            }
+            // Up to a constant.
+            assert_abs_diff_eq!(differences[0], differences[1], epsilon = 1e-5);
+        }
+    }
+
+    #[test]
+    fn a_fold_taken_away_is_a_fold_never_added() {
+        let (h, t) = problem(90, 20);
+        let weights = Array1::from_shape_fn(90, |i| 1.0 + (i % 3) as f64);
+        let part = |rows: std::ops::Range<usize>| {
+            Moments::of(
+                h.slice_axis(Axis(0), Slice::from(rows.clone())),
+                t.slice_axis(Axis(0), Slice::from(rows.clone())),
+                Some(&weights.slice_axis(Axis(0), Slice::from(rows)).to_owned()),
+            )
+        };
+        let mut rest = part(0..90);
+        rest.add(&part(60..90), -1.0);
+        let direct = part(0..60);
+        let (one, other) = (
+            rest.factor(0.1).unwrap().solve(&rest),
+            direct.factor(0.1).unwrap().solve(&direct),
+        );
+        assert_abs_diff_eq!(one.beta, other.beta, epsilon = 1e-9);
+        assert_abs_diff_eq!(one.intercept, other.intercept, epsilon = 1e-9);
+    }
+
+    #[test]
+    fn what_is_indefinite_or_not_a_number_has_no_factor() {
+        let (h, t) = problem(30, 5);
+        let moments = Moments::of(h.view(), t.view(), None);
+        assert!(moments.factor(-1e6).is_none());
+        assert!(moments.factor(f64::NAN).is_none());
+    }
+}
