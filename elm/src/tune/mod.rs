@@ -7,13 +7,13 @@
 //!
 //! 1. a coarse grid of scales, a factor of $\sqrt{10}$ apart, then smaller and smaller steps, with the
 //!    neurons given or a hundred;
-//! 2. with `auto`, direct links from the inputs to the outputs, if they pay;
-//! 3. if wanted, a scale for each input: all at once, in proportion to the slopes that the network
+//! 2. if wanted, a scale for each input: all at once, in proportion to the slopes that the network
 //!    found so far has along them (as in recursive feature machines: Radhakrishnan, Beaglehole,
 //!    Pandit and Belkin, Science 383, 2024), a few times over, so that inputs that do not matter
-//!    shrink however many they are; then one after the other, while the budget lasts;
-//! 4. unless it is given, the number of neurons: doubled as long as that pays, and the scale once
-//!    more.
+//!    shrink however many they are; then one after the other, the steepest first, while the budget lasts;
+//! 3. unless it is given, the number of neurons: doubled as long as that pays, and the scale once
+//!    more;
+//! 4. with `auto`, direct links from the inputs to the outputs, if they pay.
 //!
 //! So as not to follow noise, a step pays only if the held-out errors fall by more than one standard
 //! error of their difference, row by row: a small step of the scale by more than half of one, a large

@@ -77,6 +77,8 @@ pub(super) struct Search<'a, A: Scalar> {
     limit: usize,
     /// Where doubling ends.
     most: usize,
+    /// Slopes along the inputs, where they were last looked at.
+    steepness: Option<Vec<f64>>,
     /// Whether inputs reach the outputs directly where the search stands.
     links: bool,
 }
@@ -116,6 +118,7 @@ impl<'a, A: Scalar> Search<'a, A> {
             spent: 0,
             limit: tuner.budget,
             most,
+            steepness: None,
             links: tuner.base.links_directly(),
         })
     }
@@ -144,9 +147,6 @@ impl<'a, A: Scalar> Search<'a, A> {
             self.move_if(neurons, exponent, &[], scale_pays)?;
         }
         self.refine_scale(COARSE / 2.0, FINEST)?;
-        if self.tuner.try_links && !self.links {
-            self.link()?;
-        }
         if self.tuner.per_input && self.x.ncols() > 1 {
             self.follow_slopes()?;
             self.choose_input_scales()?;
@@ -154,6 +154,10 @@ impl<'a, A: Scalar> Search<'a, A> {
         self.limit = budget;
         if self.tuner.neurons.is_none() {
             self.choose_neurons(most)?;
+        }
+        // Last, as scales of inputs and more neurons do more where they do anything.
+        if self.tuner.try_links && !self.links {
+            self.link()?;
         }
         Ok(())
     }
@@ -249,7 +253,8 @@ impl<'a, A: Scalar> Search<'a, A> {
         }
         let slopes: Vec<f64> = squares.into_iter().map(f64::sqrt).collect();
         let usable = slopes.iter().all(|s| s.is_finite()) && slopes.iter().any(|s| *s > 0.0);
-        Ok(usable.then_some(slopes))
+        self.steepness = usable.then_some(slopes);
+        Ok(self.steepness.clone())
     }
 
     fn refine_scale(&mut self, mut step: f64, finest: f64) -> Result<()> {
@@ -275,17 +280,18 @@ impl<'a, A: Scalar> Search<'a, A> {
         Ok(())
     }
 
-    /// Coordinate by coordinate, by a factor that shrinks once no input moves.
+    /// Coordinate by coordinate, the steepest first, by a factor that shrinks once no input moves.
     fn choose_input_scales(&mut self) -> Result<()> {
         let caution = self.caution();
-        // Where not even each input can be tried once, the first ones would have all of the trials.
-        if self.x.ncols() > self.limit.saturating_sub(self.spent) {
-            return Ok(());
+        // The budget may end before the inputs do.
+        let mut order: Vec<usize> = (0..self.x.ncols()).collect();
+        if let Some(slopes) = &self.steepness {
+            order.sort_by(|&a, &b| slopes[b].total_cmp(&slopes[a]));
         }
         let mut step = 2.0 * COARSE;
         while step >= FINEST && !self.is_spent() {
             let mut moved = false;
-            for input in 0..self.x.ncols() {
+            for &input in &order {
                 for direction in [-1.0, 1.0] {
                     let Some(now) = self.now() else {
                         return Ok(());
