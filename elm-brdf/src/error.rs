@@ -59,14 +59,6 @@ pub enum Error {
     /// A material of a scene that names no source, or several.
     #[error("expected exactly one of curet, csv, model and analytic")]
     MaterialSource,
-    /// A table of samples without a column that it needs.
-    #[error("{}: there is no column '{column}'", path.display())]
-    MissingColumn {
-        /// The file.
-        path: PathBuf,
-        /// The column's name.
-        column: &'static str,
-    },
     /// A parameter of a formula out of its range.
     #[error("{what} is {value}, expected {least} to {most}")]
     AnalyticValue {
@@ -84,6 +76,17 @@ pub enum Error {
     Channels {
         /// Its channels.
         channels: usize,
+    },
+    /// Samples that lack a channel of the model, or have it twice.
+    #[error(
+        "expected the channels of the samples to be those of the model, {model}, by name, colour or \
+         wavelength; found {samples}"
+    )]
+    ChannelNames {
+        /// The model's.
+        model: String,
+        /// The samples'.
+        samples: String,
     },
     /// A folder that was asked for does not exist.
     #[error("{}: there is no such folder", path.display())]

@@ -203,6 +203,14 @@ impl FittedLink {
         &self.channels
     }
 
+    /// The links of these channels, in this order.
+    pub(crate) fn select(&self, places: &[usize]) -> Self {
+        let channels = places.iter().filter_map(|&place| self.channels.get(place));
+        Self {
+            channels: channels.copied().collect(),
+        }
+    }
+
     /// Whether a link from outside makes sense: every offset positive and finite, every ceiling
     /// finite and not negative.
     ///
@@ -238,13 +246,6 @@ impl FittedLink {
             Channel::Identity | Channel::CubeRoot { .. } => 0.0,
         };
         self.channels.iter().map(offset).collect()
-    }
-
-    /// The links of these channels.
-    pub(crate) fn select(&self, channels: &[usize]) -> Self {
-        Self {
-            channels: channels.iter().map(|&c| self.channels[c]).collect(),
-        }
     }
 
     /// Raises the offset of each channel's logarithm to three standard deviations of its noise, in

@@ -65,11 +65,34 @@ impl Table {
                 path: path.to_owned(),
                 reason,
             })?;
-        Self::parse(path, &bytes).map(|(table, _)| table)
+        Self::parse(path, &bytes, |_| Cells::Numbers).map(|(table, _)| table)
     }
 
-    /// The table, and the byte at which the record of each row begins, for [`line_of`].
-    pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<(Self, Vec<u64>), Error> {
+    /// The names of the columns alone.
+    pub(crate) fn names(path: &Path, bytes: &[u8]) -> Result<Vec<String>, Error> {
+        let source = Source { path, bytes };
+        let mut reader = ReaderBuilder::new().has_headers(false).from_reader(bytes);
+        let mut record = StringRecord::new();
+        if reader
+            .read_record(&mut record)
+            .map_err(|reason| source.error(reason))?
+        {
+            header(source, &record)
+        } else {
+            Err(Error::EmptyTable {
+                path: path.to_owned(),
+                found: "nothing",
+            })
+        }
+    }
+
+    /// The table, and the byte at which the record of each row begins, for [`line_of`]. `cells_of`
+    /// says what a column may hold, by its number.
+    pub(crate) fn parse(
+        path: &Path,
+        bytes: &[u8],
+        cells_of: impl Fn(usize) -> Cells,
+    ) -> Result<(Self, Vec<u64>), Error> {
         let source = Source { path, bytes };
         // The header is read as a row, so that its place is known.
         let mut reader = ReaderBuilder::new()
@@ -92,8 +115,9 @@ impl Table {
         while next(&mut record)? {
             begins.push(record.position().map_or(0, Position::byte));
             // The reader's own trimming would make a copy of every record.
-            for (cell, column) in record.iter().map(str::trim).zip(&columns) {
-                cells.push(number(cell).ok_or_else(|| Error::NotANumber {
+            for (index, (cell, column)) in record.iter().map(str::trim).zip(&columns).enumerate() {
+                let found = number(cell).or_else(|| cells_of(index).other(cell));
+                cells.push(found.ok_or_else(|| Error::NotANumber {
                     path: path.to_owned(),
                     line: source.line(record.position()),
                     column: Column::Name(shorten(column)),
@@ -230,6 +254,36 @@ fn header(source: Source<'_>, record: &StringRecord) -> Result<Vec<String>, Erro
         }
     }
     Ok(names().map(str::to_owned).collect())
+}
+
+/// What the cells of a column may hold beside finite numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Cells {
+    /// Nothing else.
+    Numbers,
+    /// What stands for a number that is missing.
+    Missing,
+    /// Anything.
+    Anything,
+}
+
+impl Cells {
+    /// NaN for a cell without a number that may be there.
+    fn other(self, cell: &str) -> Option<f64> {
+        const MISSING: [&str; 9] = [
+            "", "nan", "na", "n/a", "null", "none", "inf", "infinity", "-",
+        ];
+        let missing = || {
+            let word = cell.trim_start_matches(['+', '-']);
+            let is = |text: &&str| text.eq_ignore_ascii_case(word);
+            MISSING.iter().any(is) || cell.parse::<f64>().is_ok()
+        };
+        match self {
+            Self::Numbers => None,
+            Self::Missing => missing().then_some(f64::NAN),
+            Self::Anything => Some(f64::NAN),
+        }
+    }
 }
 
 fn number(cell: &str) -> Option<f64> {

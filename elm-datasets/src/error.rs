@@ -330,6 +330,28 @@ pub enum Error {
         /// The file.
         path: PathBuf,
     },
+    /// A file of a format that has no reader.
+    #[error(
+        "{}: this is {what}, which cannot be read; expected scattered samples (.csv), a MERL table \
+         (.binary), a material of RGL (.bsdf, binary) or samples for pbrt-v2 (.brdf)",
+        path.display()
+    )]
+    OtherFormat {
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        what: &'static str,
+    },
+    /// A channel asked for that a file does not have, or twice.
+    #[error("{}: expected {name:?} to be one of the channels {}", path.display(), none_or_list(channels))]
+    UnknownChannel {
+        /// The file.
+        path: PathBuf,
+        /// The name asked for, shortened if long.
+        name: String,
+        /// The channels there are.
+        channels: Vec<String>,
+    },
     /// A text that names no format.
     #[error("{text:?} is no file format: expected csv, merl, rgl or pbrt")]
     UnknownFormatName {

@@ -36,6 +36,7 @@
 #![forbid(unsafe_code)]
 
 pub mod analytic;
+pub mod channel;
 pub mod csv;
 pub mod curet;
 pub mod error;
@@ -55,7 +56,7 @@ mod vector;
 
 pub use curet::MaterialId;
 pub use error::Error;
-pub use measurements::{Invalid, Material, Measurements, Origin};
+pub use measurements::{Invalid, Material, Measurements, Origin, fill_values};
 pub use open::{Format, OpenOptions, Opened, open};
 pub use samples::{Directions, Samples};
 pub use sampling::Sampling;

@@ -11,6 +11,10 @@ use crate::error::shorten;
 use crate::{Directions, Error, Samples};
 
 /// What to do with negative reflectance, which noise gives and physics does not.
+///
+/// A file of one material may also have values that are missing: cells without a number, and
+/// [fill values](fill_values). Their rows are left out, except that [`Keep`](Self::Keep) takes
+/// fill values as measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Invalid {
@@ -38,10 +42,15 @@ impl Invalid {
     }
 
     /// Treats the negative values among `values`, shape (rows, channels): the rows that are left,
-    /// their values, and how many were negative.
+    /// their values, and how many were negative. Rows with a value that is missing (NaN) are left
+    /// out whatever is done with negative ones: there is nothing to put in its place.
     pub(crate) fn treat(self, mut values: Array2<f64>) -> (Vec<usize>, Array2<f64>, usize) {
         let invalid = values.iter().filter(|&&value| value < 0.0).count();
         let mut rows: Vec<usize> = (0..values.nrows()).collect();
+        if values.iter().any(|value| value.is_nan()) {
+            rows.retain(|&row| !values.row(row).iter().any(|value| value.is_nan()));
+            values = values.select(ndarray::Axis(0), &rows);
+        }
         match self {
             Self::Keep => {}
             // `<=`, so that a printed -0.000 loses its sign too.
@@ -49,12 +58,57 @@ impl Invalid {
                 values.mapv_inplace(|value| if value <= 0.0 { 0.0 } else { value });
             }
             Self::Drop => {
-                rows.retain(|&row| values.row(row).iter().all(|&value| value >= 0.0));
-                values = values.select(ndarray::Axis(0), &rows);
+                let kept: Vec<usize> = (0..rows.len())
+                    .filter(|&row| values.row(row).iter().all(|&value| value >= 0.0))
+                    .collect();
+                values = values.select(ndarray::Axis(0), &kept);
+                rows = kept.iter().map(|&row| rows[row]).collect();
             }
         }
         (rows, values, invalid)
     }
+}
+
+/// The negative numbers that stand for missing values among `values`, such as -999, the most
+/// negative first.
+///
+/// Noise is about as often above the truth as below it, so that no negative value of it is larger
+/// in size than what else is measured. A value is a fill value if it recurs, is larger in size than
+/// the median of the positive values, and at least twice as large as the next negative value that
+/// is none; or, where it occurs once, if it is larger than ten times the largest of all.
+///
+/// ```
+/// use elm_datasets::fill_values;
+/// use ndarray::array;
+///
+/// assert_eq!(fill_values(&array![[0.1], [-999.0], [0.3], [-0.002], [-999.0]]), [-999.0]);
+/// // Noise that was rounded recurs too.
+/// assert!(fill_values(&array![[0.1], [-0.01], [0.3], [-0.01]]).is_empty());
+/// ```
+#[must_use]
+pub fn fill_values(values: &Array2<f64>) -> Vec<f64> {
+    let mut positive: Vec<f64> = values.iter().copied().filter(|&v| v > 0.0).collect();
+    positive.sort_unstable_by(f64::total_cmp);
+    let median = positive.get(positive.len() / 2).copied().unwrap_or(0.0);
+    let largest = positive.last().copied().unwrap_or(0.0);
+    let mut negative: Vec<f64> = values.iter().copied().filter(|&v| v < 0.0).collect();
+    negative.sort_unstable_by(f64::total_cmp);
+    let mut fills = Vec::new();
+    let mut rest = negative.as_slice();
+    while let Some(&value) = rest.first() {
+        let count = rest.iter().take_while(|&&other| other == value).count();
+        let next = rest.get(count).copied().unwrap_or(0.0);
+        let size = -value;
+        let recurs = count > 1 && size > median && size >= -2.0 * next;
+        let alone = size > 10.0 * largest && size >= -2.0 * next;
+        // Without anything positive there is no telling.
+        if largest <= 0.0 || !(recurs || alone) {
+            break;
+        }
+        fills.push(value);
+        rest = &rest[count..];
+    }
+    fills
 }
 
 impl fmt::Display for Invalid {

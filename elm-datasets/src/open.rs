@@ -11,7 +11,7 @@ use ndarray::Axis;
 use crate::error::shorten;
 use crate::merl::Merl;
 use crate::rgl::Rgl;
-use crate::{Error, Invalid, Samples, Sampling, merl, pbrt, rgl, scattered};
+use crate::{Error, Invalid, Samples, Sampling, channel, fill_values, merl, pbrt, rgl, scattered};
 
 /// A file format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -45,7 +45,8 @@ impl Format {
     /// The format of a file: by its first bytes where they tell, otherwise by the end of its name.
     ///
     /// # Errors
-    /// [`Error::Read`] if the file cannot be read, [`Error::UnknownFormat`] if neither tells.
+    /// [`Error::Read`] if the file cannot be read, [`Error::OtherFormat`] if it is of a format that
+    /// has no reader here, [`Error::UnknownFormat`] if nothing tells.
     pub fn of(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         let mut start = Vec::new();
@@ -61,6 +62,12 @@ impl Format {
         if merl::begins(&start) {
             return Ok(Self::Merl);
         }
+        if let Some(what) = other_format(&start) {
+            return Err(Error::OtherFormat {
+                path: path.to_owned(),
+                what,
+            });
+        }
         let end = path.extension().unwrap_or_default();
         [
             ("csv", Self::Scattered),
@@ -75,6 +82,44 @@ impl Format {
         .ok_or_else(|| Error::UnknownFormat {
             path: path.to_owned(),
         })
+    }
+}
+
+/// What a file is that no reader here reads, where its beginning tells.
+fn other_format(start: &[u8]) -> Option<&'static str> {
+    let text: Vec<&str> = start
+        .split(|&byte| byte == b'\n')
+        .filter_map(|line| std::str::from_utf8(line).ok())
+        .map(|line| line.trim_matches(['\u{feff}', ' ', '\t', '\r']))
+        .filter(|line| !line.is_empty())
+        .collect();
+    let first = text.first()?;
+    let begins = |line: &str, word: &str| {
+        let found = line.split_ascii_whitespace().next().unwrap_or_default();
+        found.eq_ignore_ascii_case(word)
+    };
+    let has = |word: &str| text.iter().any(|line| begins(line, word));
+    let mentions = |word: &str| text.iter().any(|line| line.contains(word));
+    if first.starts_with("#?RADIANCE") {
+        Some("a file of Radiance")
+    } else if first.starts_with('<') && mentions("WindowElement") {
+        Some("a BSDF of Radiance or WINDOW in XML")
+    } else if first.starts_with('<') {
+        Some("XML")
+    } else if [
+        "ScatterType",
+        "AngleOfIncidence",
+        "ScatterRadial",
+        "SpectralContent",
+    ]
+    .iter()
+    .filter(|&&word| has(word))
+    .count()
+        >= 2
+    {
+        Some("a BSDF table of Zemax (Radiant Zemax, in text)")
+    } else {
+        None
     }
 }
 
@@ -105,14 +150,17 @@ impl FromStr for Format {
 /// |---|---|---|
 /// | `format` | none | the format, where it is not to be found out |
 /// | `scattered` | radians, without the cosine | what a CSV file does not say itself |
+/// | `columns` | all that can be reflectance | which columns of a CSV file are channels |
 /// | `sampling` | 20,000 at random | where to look up a tabulated BRDF: MERL and RGL |
 /// | `invalid` | clamp | what to do with negative values that are measured |
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct OpenOptions {
     /// The format; `None` to find it out.
     pub format: Option<Format>,
     /// For CSV files.
     pub scattered: scattered::Options,
+    /// For CSV files.
+    pub columns: scattered::Columns,
     /// For MERL and RGL files.
     pub sampling: Sampling,
     /// For all files.
@@ -126,8 +174,19 @@ pub struct Opened {
     pub samples: Samples,
     /// The format of the file.
     pub format: Format,
-    /// How many values were negative, whatever became of them.
+    /// How many values were negative and no fill values, whatever became of them.
     pub invalid: usize,
+    /// How many values were missing: cells without a number, and
+    /// [fill values](crate::fill_values) unless they are kept. Their rows are not among the
+    /// samples.
+    pub missing: usize,
+    /// The fill values met, the most negative first.
+    pub fills: Vec<f64>,
+    /// How many rows were left out, because a value was missing or, with [`Invalid::Drop`],
+    /// negative.
+    pub left_out: usize,
+    /// What was assumed of a CSV file.
+    pub notes: Vec<scattered::Note>,
     /// How many of the pairs of directions asked for a table has no measurement at. They are not
     /// among the samples.
     pub unmeasured: usize,
@@ -157,18 +216,47 @@ pub fn open(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Opened, Err
         Some(format) => format,
         None => Format::of(path)?,
     };
-    let (samples, unmeasured) = match format {
-        Format::Scattered => (scattered::read(path, &options.scattered)?, 0),
-        Format::Merl => Merl::read(path)?.samples(&options.sampling)?,
-        Format::Rgl => (Rgl::read(path)?.samples(&options.sampling)?, 0),
-        Format::Pbrt => (pbrt::read(path)?, 0),
+    let (mut samples, unmeasured, notes) = match format {
+        Format::Scattered => {
+            let parsed = scattered::read_with(path, &options.scattered, &options.columns)?;
+            (parsed.samples, 0, parsed.notes)
+        }
+        Format::Merl => {
+            let (samples, unmeasured) = Merl::read(path)?.samples(&options.sampling)?;
+            (samples, unmeasured, Vec::new())
+        }
+        Format::Rgl => (Rgl::read(path)?.samples(&options.sampling)?, 0, Vec::new()),
+        Format::Pbrt => (pbrt::read_with_missing(path)?, 0, Vec::new()),
     };
+    if matches!(format, Format::Merl | Format::Rgl | Format::Pbrt) {
+        samples = chosen(path, samples, &options.columns)?;
+    }
+    // A formula's table has no fill values.
+    let measured = matches!(format, Format::Scattered | Format::Pbrt);
+    let fills = if measured && options.invalid != Invalid::Keep {
+        fill_values(&samples.values)
+    } else {
+        Vec::new()
+    };
+    if !fills.is_empty() {
+        let blank = |value: f64| {
+            if fills.contains(&value) {
+                f64::NAN
+            } else {
+                value
+            }
+        };
+        samples.values.mapv_inplace(blank);
+    }
+    let missing = samples.values.iter().filter(|value| value.is_nan()).count();
+    let all = samples.values.nrows();
     let (rows, values, invalid) = options.invalid.treat(samples.values);
     if values.len_of(Axis(0)) == 0 {
         return Err(Error::NothingMeasured {
             path: path.to_owned(),
         });
     }
+    let left_out = all - rows.len();
     let pairs = rows.iter().filter_map(|&row| samples.directions.get(row));
     Ok(Opened {
         samples: Samples {
@@ -178,6 +266,42 @@ pub fn open(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Opened, Err
         },
         format,
         invalid,
+        missing,
+        fills,
+        left_out,
+        notes,
         unmeasured,
     })
+}
+
+/// The channels asked for, of a file that is no table of columns.
+fn chosen(path: &Path, samples: Samples, columns: &scattered::Columns) -> Result<Samples, Error> {
+    let unknown = |name: &String| Error::UnknownChannel {
+        path: path.to_owned(),
+        name: shorten(name),
+        channels: samples.channels.clone(),
+    };
+    let place =
+        |name: &String| channel::place(name, &samples.channels).ok_or_else(|| unknown(name));
+    let ignored: Vec<usize> = columns.ignore.iter().map(place).collect::<Result<_, _>>()?;
+    let mut places: Vec<usize> = Vec::new();
+    if columns.channels.is_empty() {
+        places.extend((0..samples.channels.len()).filter(|place| !ignored.contains(place)));
+    }
+    for name in &columns.channels {
+        let place = place(name)?;
+        if places.contains(&place) || ignored.contains(&place) {
+            return Err(unknown(name));
+        }
+        places.push(place);
+    }
+    if places.is_empty() {
+        return Err(Error::NothingMeasured {
+            path: path.to_owned(),
+        });
+    }
+    if places.len() == samples.channels.len() && places.is_sorted() {
+        return Ok(samples);
+    }
+    Ok(samples.with_channels(&places))
 }

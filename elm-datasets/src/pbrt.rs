@@ -16,6 +16,7 @@ use std::path::Path;
 use ndarray::Array2;
 
 use crate::error::{Column, shorten};
+use crate::scattered::HORIZON_TOLERANCE;
 use crate::{Directions, Error, Samples, file};
 
 const ANGLES: [&str; 4] = ["theta_i", "phi_i", "theta_o", "phi_o"];
@@ -71,7 +72,7 @@ pub enum Problem {
 /// [`Error::Pbrt`] with the line and the [`Problem`] for what is no such file.
 pub fn read(path: impl AsRef<Path>) -> Result<Samples, Error> {
     let path = path.as_ref();
-    parse(path, &file::read(path)?)
+    parse(path, &file::read(path)?, false)
 }
 
 /// As [`read`], from a stream. `name` takes the place of the file in errors.
@@ -82,7 +83,7 @@ pub fn from_reader(mut stream: impl Read, name: impl AsRef<Path>) -> Result<Samp
     let path = name.as_ref();
     let mut bytes = Vec::new();
     match stream.read_to_end(&mut bytes) {
-        Ok(_) => parse(path, &bytes),
+        Ok(_) => parse(path, &bytes, false),
         Err(reason) => Err(Error::Read {
             path: path.to_owned(),
             reason,
@@ -90,7 +91,12 @@ pub fn from_reader(mut stream: impl Read, name: impl AsRef<Path>) -> Result<Samp
     }
 }
 
-fn parse(path: &Path, bytes: &[u8]) -> Result<Samples, Error> {
+/// As [`read`], with NaN for values that are missing: `nan` in place of a number.
+pub(crate) fn read_with_missing(path: &Path) -> Result<Samples, Error> {
+    parse(path, &file::read(path)?, true)
+}
+
+fn parse(path: &Path, bytes: &[u8], missing: bool) -> Result<Samples, Error> {
     let mut words = Words::new(path, bytes);
     let first = words.need(1)?;
     // Each wavelength takes two bytes at least.
@@ -117,12 +123,15 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<Samples, Error> {
                 angles[index] = words.need(ANGLES.len() - index + count)?;
             }
             let (angle, found) = (ANGLES[index], angles[index]);
-            if angle.starts_with("theta") && !(0.0..=FRAC_PI_2).contains(&found) {
-                return Err(words.error(Problem::PolarAngle { angle, found }));
+            if angle.starts_with("theta") {
+                if !(-HORIZON_TOLERANCE..=FRAC_PI_2 + HORIZON_TOLERANCE).contains(&found) {
+                    return Err(words.error(Problem::PolarAngle { angle, found }));
+                }
+                angles[index] = found.clamp(0.0, FRAC_PI_2);
             }
         }
         for channel in 0..count {
-            values.push(words.need(count - channel)?);
+            values.push(words.value(count - channel, missing)?);
         }
         let [theta_i, phi_i, theta_o, phi_o] = angles;
         directions.push(Directions {
@@ -204,6 +213,18 @@ impl<'a> Words<'a> {
         match self.next()? {
             Some(number) => Ok(number),
             None => Err(self.error(Problem::Incomplete { expected })),
+        }
+    }
+
+    /// As [`need`](Self::need), with NaN for a word that says so, if values may be missing.
+    fn value(&mut self, expected: usize, missing: bool) -> Result<f64, Error> {
+        match self.need(expected) {
+            Err(Error::NotANumber { text, .. })
+                if missing && text.parse::<f64>().is_ok_and(|number| !number.is_finite()) =>
+            {
+                Ok(f64::NAN)
+            }
+            found => found,
         }
     }
 

@@ -71,6 +71,40 @@ pub struct Samples {
     pub channels: Vec<String>,
 }
 
+impl Samples {
+    /// The same with these channels alone, in this order: places among those there are.
+    pub(crate) fn with_channels(&self, places: &[usize]) -> Self {
+        let places: Vec<usize> = places
+            .iter()
+            .copied()
+            .filter(|&place| place < self.channels.len().min(self.values.ncols()))
+            .collect();
+        Self {
+            directions: self.directions.clone(),
+            values: self.values.select(ndarray::Axis(1), &places),
+            channels: places.iter().map(|&p| self.channels[p].clone()).collect(),
+        }
+    }
+
+    /// The same with the channels that `wanted` names, in that order, as
+    /// [`channel::places`](crate::channel::places) matches them; `None` where one is missing.
+    #[must_use]
+    pub fn matched(&self, wanted: &[String]) -> Option<Self> {
+        let places = crate::channel::places(wanted, &self.channels)?;
+        Some(self.with_channels(&places))
+    }
+
+    /// The same with red first, then green, then blue, where its three channels are colours or
+    /// wavelengths; unchanged where they are not.
+    #[must_use]
+    pub fn in_rgb_order(self) -> Self {
+        match crate::channel::rgb(&self.channels) {
+            None | Some([0, 1, 2]) => self,
+            Some(places) => self.with_channels(&places),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,30 +3,48 @@
 //! The first line names the columns, in any order and either case. Directions are four angles,
 //! `theta_i, phi_i, theta_o, phi_o`, or two unit vectors, `wi_x, wi_y, wi_z, wo_x, wo_y, wo_z`:
 //! `i` towards the light, `o` towards the viewer, in the frame of the surface with its normal
-//! along z. All other columns are channels.
+//! along z. All other columns are channels, if their names can be those of reflectance: a colour, a
+//! wavelength, `brdf` and the like, or names of which none is known here. A name that says something
+//! else (`std`, `row`), or nothing beside one that does say reflectance, is an error, until
+//! [`Columns`] says what is what.
 //!
 //! ```text
 //! theta_i,phi_i,theta_o,phi_o,r,g,b
 //! 1.404838,-0.060443,0.802262,-0.412098,0,7.33722e-05,0.0010182
 //! ```
+//!
+//! With a column of wavelengths (`wavelength`, `lambda`, with or without a unit) beside one of values
+//! the rows of one pair of directions become one, with a channel per wavelength.
+//!
+//! # What is assumed of directions
+//! - A direction up to 5e-4 radians (0.029 degrees) below the horizon is on it: the rounding of
+//!   numbers with three decimals.
+//! - A negative polar angle, as scans in a plane have them, is on the other side of the normal: half
+//!   a turn is added to its azimuth.
+//! - Rows whose viewer is below the surface are transmitted light, and left out, if any others are
+//!   left.
+//! - Degrees that are all below 1.571, with azimuths up to 6.28, are radians, and an error.
 
-use std::f64::consts::FRAC_PI_2;
+mod angles;
+mod columns;
+mod long;
+
+use std::fmt;
 use std::io::{self, Read, Write};
 use std::path::Path;
 
 use ndarray::{Array2, Axis};
 
-use crate::csv::{Table, line_of};
+use crate::csv::{Cells, Table, line_of};
 use crate::error::shorten;
-use crate::vector::{Vector, directions, dot};
-use crate::{Directions, Error, Samples, file};
+use crate::{Directions, Error, Samples, channel, file};
+pub(crate) use angles::HORIZON_TOLERANCE;
+use angles::{Found, Reader};
+pub use columns::List;
+use columns::Plan;
 
 const ANGLES: [&str; 4] = ["theta_i", "phi_i", "theta_o", "phi_o"];
 const VECTORS: [&str; 6] = ["wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z"];
-
-/// How far from 1 the length of a direction may be: numbers with three decimals are each up to
-/// 0.0005 off, so the length up to `sqrt(3) * 0.0005`.
-const LENGTH_TOLERANCE: f64 = 1e-3;
 
 /// The unit of the angles in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -45,6 +63,110 @@ pub struct Options {
     pub unit: AngleUnit,
     /// Whether the values are BRDF times the cosine of `theta_i`. They are then divided by it.
     pub cosine_weighted: bool,
+}
+
+/// Which columns are channels, and what their values are, where their names do not say it.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Columns {
+    /// The channels, in this order; all that can be reflectance if there are none here. Names are
+    /// those of columns, or colours or wavelengths that they are of.
+    pub channels: Vec<String>,
+    /// Columns to leave out.
+    pub ignore: Vec<String>,
+    /// Whether the values are BRDF times the cosine of `theta_o`, the scatter angle. They are then
+    /// divided by it.
+    pub scatter_cosine: bool,
+}
+
+/// What was assumed of a table, or left out of it.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Note {
+    /// Directions a rounding below the horizon.
+    Horizon {
+        /// How many.
+        directions: usize,
+    },
+    /// Negative polar angles.
+    Mirrored {
+        /// How many.
+        angles: usize,
+    },
+    /// Rows with the viewer below the surface.
+    Transmitted {
+        /// How many.
+        rows: usize,
+        /// Unit of the angles.
+        unit: AngleUnit,
+    },
+    /// Degrees that may be radians.
+    LooksLikeRadians {
+        /// The largest polar angle.
+        theta: f64,
+    },
+    /// Radians that may be degrees.
+    LooksLikeDegrees {
+        /// The largest azimuth.
+        phi: f64,
+    },
+    /// Columns that are no channels.
+    LeftOut {
+        /// Their names.
+        columns: List,
+    },
+    /// A row per wavelength.
+    Pivoted {
+        /// Rows of the file.
+        rows: usize,
+        /// Wavelengths.
+        channels: usize,
+        /// Pairs of directions.
+        pairs: usize,
+    },
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Horizon { directions } => write!(
+                f,
+                "{directions} directions up to 0.029 degrees below the horizon were taken to be on it"
+            ),
+            Self::Mirrored { angles } => write!(
+                f,
+                "{angles} polar angles are negative: taken as on the other side of the normal, half a \
+                 turn added to their azimuths"
+            ),
+            Self::Transmitted { rows, unit } => {
+                write!(
+                    f,
+                    "{rows} rows have the viewer below the surface (transmitted light) and were left out"
+                )?;
+                match unit {
+                    AngleUnit::Radians => f.write_str("; if the angles are degrees, say --degrees"),
+                    AngleUnit::Degrees => Ok(()),
+                }
+            }
+            Self::LooksLikeRadians { theta } => write!(
+                f,
+                "no polar angle is above {theta} degrees: if these are radians, leave out --degrees"
+            ),
+            Self::LooksLikeDegrees { phi } => write!(
+                f,
+                "azimuths go up to {phi} radians: if the angles are degrees, say --degrees"
+            ),
+            Self::LeftOut { columns } => write!(f, "columns left out: {columns}"),
+            Self::Pivoted {
+                rows,
+                channels,
+                pairs,
+            } => write!(
+                f,
+                "{rows} rows of one wavelength each became {pairs} pairs of directions with \
+                 {channels} channels"
+            ),
+        }
+    }
 }
 
 /// What is wrong with a table of samples.
@@ -70,8 +192,9 @@ pub enum Problem {
     NoValues,
     /// A polar angle that is negative or below the horizon.
     #[error(
-        "expected {angle} from 0 to {}, found {found}",
-        if *unit == AngleUnit::Radians { "pi/2 radians" } else { "90 degrees" }
+        "expected {angle} from 0 to {}, found {found}{}",
+        if *unit == AngleUnit::Radians { "pi/2 radians" } else { "90 degrees" },
+        if *unit == AngleUnit::Radians { " (angles in degrees need --degrees)" } else { "" }
     )]
     PolarAngle {
         /// Name of the column.
@@ -80,6 +203,54 @@ pub enum Problem {
         unit: AngleUnit,
         /// The angle found, in that unit.
         found: f64,
+    },
+    /// Angles said to be degrees that can hardly be any.
+    #[error(
+        "no polar angle is above {theta} degrees and no azimuth above {phi}: these are radians, so \
+         leave out --degrees"
+    )]
+    LooksLikeRadians {
+        /// The largest polar angle.
+        theta: f64,
+        /// The largest azimuth.
+        phi: f64,
+    },
+    /// Columns whose names are not those of reflectance.
+    #[error(
+        "these columns do not look like reflectance: {columns}; leave them out with --ignore, or \
+         name the columns of reflectance with --channels"
+    )]
+    NotReflectance {
+        /// The names.
+        columns: List,
+    },
+    /// A column asked for that is not there, or named twice.
+    #[error("expected {name:?} to be one column of reflectance; there are {columns}")]
+    NoSuchColumn {
+        /// The name asked for, shortened if long.
+        name: String,
+        /// The names there are.
+        columns: List,
+    },
+    /// A table with a row per wavelength that has several values in a row.
+    #[error(
+        "expected one column of values beside the wavelength, found {columns}; name it with --channels"
+    )]
+    SeveralPerWavelength {
+        /// The names.
+        columns: List,
+    },
+    /// A wavelength that is none.
+    #[error("expected a wavelength, and at most 1000 different ones, found {found}")]
+    Wavelength {
+        /// The number.
+        found: f64,
+    },
+    /// A row that lacks a value, where nothing can be left out.
+    #[error("expected a value in every row, found none for {channel}")]
+    NoValue {
+        /// The channel, shortened if long.
+        channel: String,
     },
     /// A vector that is no direction.
     #[error("expected {vector} to be a unit vector, found length {found}")]
@@ -99,9 +270,14 @@ pub enum Problem {
     },
     /// A cosine-weighted value from which the BRDF cannot be had back.
     #[error(
-        "expected the light above the horizon, for the values are to be divided by cos theta_i"
+        "expected {direction} above the horizon, for the values are to be divided by cos {angle}"
     )]
-    NoCosine,
+    NoCosine {
+        /// The light or the viewer.
+        direction: &'static str,
+        /// Its polar angle.
+        angle: &'static str,
+    },
     /// Samples to be written that do not fit together.
     #[error(
         "expected as many directions as rows, and names as columns; found {directions} directions \
@@ -152,7 +328,7 @@ pub enum Problem {
 /// - [`Error::Scattered`] for what is no table of samples, with the line and the [`Problem`].
 pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<Samples, Error> {
     let path = path.as_ref();
-    parse(path, &file::read(path)?, options)
+    whole(path, &file::read(path)?, options)
 }
 
 /// As [`read`], from a stream. `name` takes the place of the file in errors.
@@ -167,7 +343,7 @@ pub fn from_reader(
     let path = name.as_ref();
     let mut bytes = Vec::new();
     match stream.read_to_end(&mut bytes) {
-        Ok(_) => parse(path, &bytes, options),
+        Ok(_) => whole(path, &bytes, options),
         Err(reason) => Err(Error::Read {
             path: path.to_owned(),
             reason,
@@ -186,145 +362,197 @@ pub(crate) fn begins(bytes: &[u8]) -> bool {
     ANGLES.iter().all(is) || VECTORS.iter().all(is)
 }
 
-fn parse(path: &Path, bytes: &[u8], options: &Options) -> Result<Samples, Error> {
-    let (table, begins) = Table::parse(path, bytes)?;
-    let error = |row: Option<usize>, problem| {
-        let line = match row {
-            Some(row) => line_of(bytes, begins.get(row).copied().unwrap_or(u64::MAX)),
-            // A byte order mark is no line.
-            None => line_of(bytes, 0),
-        };
-        Error::Scattered {
+/// What was in a table: samples, of which a value that is missing is NaN, and what was assumed.
+pub(crate) struct Parsed {
+    pub(crate) samples: Samples,
+    pub(crate) notes: Vec<Note>,
+}
+
+/// A table in which no value is missing.
+fn whole(path: &Path, bytes: &[u8], options: &Options) -> Result<Samples, Error> {
+    let samples = parse(path, bytes, options, &Columns::default(), Cells::Numbers)?.samples;
+    // A value per wavelength and pair may be missing though no cell of the table is.
+    match samples.values.indexed_iter().find(|(_, v)| v.is_nan()) {
+        None => Ok(samples),
+        Some(((_, column), _)) => Err(Error::Scattered {
             path: path.to_owned(),
-            line,
-            problem,
-        }
+            line: line_of(bytes, 0),
+            problem: Problem::NoValue {
+                channel: shorten(&samples.channels[column]),
+            },
+        }),
+    }
+}
+
+/// As [`read`], of a table whose values may be missing.
+pub(crate) fn read_with(path: &Path, options: &Options, choice: &Columns) -> Result<Parsed, Error> {
+    parse(path, &file::read(path)?, options, choice, Cells::Missing)
+}
+
+fn parse(
+    path: &Path,
+    bytes: &[u8],
+    options: &Options,
+    choice: &Columns,
+    values: Cells,
+) -> Result<Parsed, Error> {
+    let error = |line, problem| Error::Scattered {
+        path: path.to_owned(),
+        line,
+        problem,
     };
-    let (set, channels) = split(&table.columns).map_err(|problem| error(None, problem))?;
-    let mut values = table.values.select(Axis(1), &channels);
-    let mut pairs = Vec::with_capacity(table.values.nrows());
-    for (row, cells) in table.values.rows().into_iter().enumerate() {
-        let pair = match set {
-            Columns::Angles(columns) => from_angles(columns.map(|c| cells[c]), options.unit),
-            Columns::Vectors(columns) => from_vectors(columns.map(|c| cells[c])),
+    // A byte order mark is no line.
+    let head = || line_of(bytes, 0);
+    let names = Table::names(path, bytes)?;
+    let plan = Plan::new(&names, choice).map_err(|problem| error(head(), problem))?;
+    let (table, begins) = Table::parse(path, bytes, |column| {
+        if plan.channels.contains(&column) {
+            values
+        } else if plan.directions.contains(column) || plan.wavelength == Some(column) {
+            Cells::Numbers
+        } else {
+            Cells::Anything
         }
-        .map_err(|problem| error(Some(row), problem))?;
-        if options.cosine_weighted {
-            let cos = pair.theta_i.cos();
+    })?;
+    let at = |row: usize, problem| {
+        let begin = begins.get(row).copied().unwrap_or(u64::MAX);
+        error(line_of(bytes, begin), problem)
+    };
+    let (rows, mut samples, mut notes) =
+        reflected(&table, &plan, options, choice).map_err(|(row, problem)| {
+            row.map_or_else(
+                || error(head(), problem.clone()),
+                |row| at(row, problem.clone()),
+            )
+        })?;
+    if let Some(column) = plan.wavelength {
+        let wavelengths = table.values.column(column).select(Axis(0), &rows).to_vec();
+        samples = long::pivot(&samples, &wavelengths, &names[column])
+            .map_err(|(row, found)| at(rows[row], Problem::Wavelength { found }))?;
+        notes.push(Note::Pivoted {
+            rows: rows.len(),
+            channels: samples.channels.len(),
+            pairs: samples.directions.len(),
+        });
+        samples = wavelengths_asked_for(samples, &names, &plan, choice)
+            .map_err(|problem| error(head(), problem))?;
+    }
+    if !plan.left_out.is_empty() {
+        let columns = List::of(plan.left_out.iter().map(|&c| &names[c]));
+        notes.push(Note::LeftOut { columns });
+    }
+    Ok(Parsed { samples, notes })
+}
+
+/// The rows above the surface with their samples, and what was assumed; in an error the row, if it
+/// is one's.
+fn reflected(
+    table: &Table,
+    plan: &Plan,
+    options: &Options,
+    choice: &Columns,
+) -> Result<(Vec<usize>, Samples, Vec<Note>), (Option<usize>, Problem)> {
+    let mut reader = Reader::new(options.unit);
+    let (mut rows, mut pairs) = (Vec::new(), Vec::new());
+    let (mut below, mut transmitted) = (None, 0);
+    for (row, cells) in table.values.rows().into_iter().enumerate() {
+        let found = match plan.directions {
+            columns::Directions::Angles(columns) => reader.angles(columns.map(|c| cells[c])),
+            columns::Directions::Vectors(columns) => reader.vectors(columns.map(|c| cells[c])),
+        };
+        match found.map_err(|problem| (Some(row), problem))? {
+            Found::Reflected(pair) => {
+                rows.push(row);
+                pairs.push(pair);
+            }
+            Found::Transmitted(problem) => {
+                below = below.or(Some((Some(row), problem)));
+                transmitted += 1;
+            }
+        }
+    }
+    if let (true, Some(problem)) = (rows.is_empty(), below) {
+        return Err(problem);
+    }
+    let mut notes = reader.finish().map_err(|problem| (None, problem))?;
+    if transmitted > 0 {
+        notes.push(Note::Transmitted {
+            rows: transmitted,
+            unit: options.unit,
+        });
+    }
+    let mut values = table
+        .values
+        .select(Axis(1), &plan.channels)
+        .select(Axis(0), &rows);
+    for (index, pair) in pairs.iter().enumerate() {
+        for (weighted, theta, direction, angle) in [
+            (
+                options.cosine_weighted,
+                pair.theta_i,
+                "the light",
+                "theta_i",
+            ),
+            (choice.scatter_cosine, pair.theta_o, "the viewer", "theta_o"),
+        ] {
+            if !weighted {
+                continue;
+            }
+            let cos = theta.cos();
             // The cosine of the closest number to pi/2 is 6e-17.
             if cos <= f64::EPSILON {
-                return Err(error(Some(row), Problem::NoCosine));
+                return Err((Some(rows[index]), Problem::NoCosine { direction, angle }));
             }
-            values.row_mut(row).mapv_inplace(|value| value / cos);
+            values.row_mut(index).mapv_inplace(|value| value / cos);
         }
-        pairs.push(pair);
     }
-    let names = channels
-        .iter()
-        .filter_map(|&c| table.columns.get(c).cloned());
-    Ok(Samples {
+    let names = plan.channels.iter().map(|&c| table.columns[c].clone());
+    let samples = Samples {
         directions: pairs,
         values,
         channels: names.collect(),
-    })
+    };
+    Ok((rows, samples, notes))
 }
 
-/// Where the directions stand.
-#[derive(Clone, Copy)]
-enum Columns {
-    Angles([usize; 4]),
-    Vectors([usize; 6]),
-}
-
-/// The columns of the directions, and those of the values.
-fn split(columns: &[String]) -> Result<(Columns, Vec<usize>), Problem> {
-    let place = |name: &&str| columns.iter().position(|c| c.eq_ignore_ascii_case(name));
-    let (angles, vectors) = (ANGLES.map(|n| place(&n)), VECTORS.map(|n| place(&n)));
-    let some = |places: &[Option<usize>]| places.iter().any(Option::is_some);
-    if some(&angles) && some(&vectors) {
-        return Err(Problem::BothDirections);
-    }
-    let missing = |names: &[&'static str]| {
-        let names = names.iter().copied();
-        names.filter(|name| place(name).is_none()).collect()
+/// Of the channels that wavelengths have become those that were asked for, if any were.
+fn wavelengths_asked_for(
+    samples: Samples,
+    names: &[String],
+    plan: &Plan,
+    choice: &Columns,
+) -> Result<Samples, Problem> {
+    let is_column = |name: &String| {
+        let mut values = plan.channels.iter();
+        values.any(|&c| names[c].trim().eq_ignore_ascii_case(name.trim()))
     };
-    let set = match (all(angles), all(vectors)) {
-        (Some(places), _) => Columns::Angles(places),
-        (_, Some(places)) => Columns::Vectors(places),
-        _ => {
-            let missing = missing(if some(&vectors) { &VECTORS } else { &ANGLES });
-            return Err(Problem::NoDirections { missing });
-        }
-    };
-    let channels: Vec<usize> = (0..columns.len())
-        .filter(|&column| match set {
-            Columns::Angles(places) => !places.contains(&column),
-            Columns::Vectors(places) => !places.contains(&column),
-        })
+    let asked: Vec<String> = choice
+        .channels
+        .iter()
+        .filter(|name| !is_column(name))
+        .cloned()
         .collect();
-    if channels.is_empty() {
-        return Err(Problem::NoValues);
+    if asked.is_empty() {
+        return Ok(samples);
     }
-    // Two spellings of one name would leave an angle among the values.
-    match channels.iter().find(|&&c| is_direction(&columns[c])) {
-        Some(_) => Err(Problem::BothDirections),
-        None => Ok((set, channels)),
+    let mut places = Vec::with_capacity(asked.len());
+    for name in &asked {
+        match channel::place(name, &samples.channels) {
+            Some(place) if !places.contains(&place) => places.push(place),
+            _ => {
+                return Err(Problem::NoSuchColumn {
+                    name: shorten(name),
+                    columns: List::of(&samples.channels),
+                });
+            }
+        }
     }
-}
-
-fn all<const N: usize>(places: [Option<usize>; N]) -> Option<[usize; N]> {
-    let mut found = [0; N];
-    for (to, from) in found.iter_mut().zip(places) {
-        *to = from?;
-    }
-    Some(found)
+    Ok(samples.with_channels(&places))
 }
 
 fn is_direction(name: &str) -> bool {
     let mut names = ANGLES.iter().chain(&VECTORS);
     names.any(|direction| direction.eq_ignore_ascii_case(name))
-}
-
-fn from_angles(found: [f64; 4], unit: AngleUnit) -> Result<Directions, Problem> {
-    let radians = found.map(|angle| match unit {
-        AngleUnit::Radians => angle,
-        AngleUnit::Degrees => angle.to_radians(),
-    });
-    for index in [0, 2] {
-        if !(0.0..=FRAC_PI_2).contains(&radians[index]) {
-            return Err(Problem::PolarAngle {
-                angle: ANGLES[index],
-                unit,
-                found: found[index],
-            });
-        }
-    }
-    let [theta_i, phi_i, theta_o, phi_o] = radians;
-    Ok(Directions {
-        theta_i,
-        phi_i,
-        theta_o,
-        phi_o,
-    })
-}
-
-fn from_vectors([ix, iy, iz, ox, oy, oz]: [f64; 6]) -> Result<Directions, Problem> {
-    let check = |vector, direction: Vector| {
-        let length = dot(direction, direction).sqrt();
-        if (length - 1.0).abs() > LENGTH_TOLERANCE {
-            let found = length;
-            return Err(Problem::Length { vector, found });
-        }
-        if direction[2] < 0.0 {
-            let found = direction[2];
-            return Err(Problem::BelowHorizon { vector, found });
-        }
-        Ok(direction)
-    };
-    Ok(directions(
-        check("wi", [ix, iy, iz])?,
-        check("wo", [ox, oy, oz])?,
-    ))
 }
 
 /// Writes samples as angles in radians and their values, each number with as many digits as it
@@ -408,6 +636,16 @@ fn check_samples(samples: &Samples) -> Result<(), (usize, Problem)> {
             return Err((1, Problem::ChannelName { name }));
         }
     }
+    let header: Vec<String> = ANGLES
+        .map(str::to_owned)
+        .into_iter()
+        .chain(channels.iter().cloned())
+        .collect();
+    let plan = Plan::new(&header, &Columns::default()).map_err(|problem| (1, problem))?;
+    if plan.wavelength.is_some() {
+        let name = shorten(channels.first().map_or("", String::as_str));
+        return Err((1, Problem::ChannelName { name }));
+    }
     for (row, pair) in directions.iter().enumerate() {
         let line = row + 2;
         check_row(pair, values, row, channels).map_err(|problem| (line, problem))?;
@@ -431,5 +669,12 @@ fn check_row(
             return Err(Problem::NotFinite { column, found });
         }
     }
-    from_angles(angles(pair), AngleUnit::Radians).map(|_| ())
+    for (angle, found) in [("theta_i", pair.theta_i), ("theta_o", pair.theta_o)] {
+        // What the reader would take for another number, or leave out.
+        if !(0.0..=std::f64::consts::FRAC_PI_2).contains(&found) {
+            let unit = AngleUnit::Radians;
+            return Err(Problem::PolarAngle { angle, unit, found });
+        }
+    }
+    Ok(())
 }

@@ -40,10 +40,10 @@ fn close(found: &Directions, expected: [f64; 4]) {
 
 #[test]
 fn columns_are_known_by_name_in_any_order_and_the_rest_are_channels() {
-    let text = "550nm,phi_o,Theta_I,note,theta_o,PHI_I\n1,2,0.5,3,0.25,-4\n";
+    let text = "550nm,phi_o,Theta_I,650nm,theta_o,PHI_I\n1,2,0.5,3,0.25,-4\n";
     let samples = parse(text, &RADIANS).unwrap();
     close(&samples.directions[0], [0.5, -4.0, 0.25, 2.0]);
-    assert_eq!(samples.channels, ["550nm", "note"]);
+    assert_eq!(samples.channels, ["550nm", "650nm"]);
     assert_eq!(samples.values, array![[1.0, 3.0]]);
 }
 
@@ -99,7 +99,7 @@ const DAMAGE: &[(&str, &str, Options, &[&str])] = &[
     ("not a number", "theta_i,phi_i,theta_o,phi_o,y\n0,0,NaN,0,1\n", RADIANS, &["line 2", "column \"theta_o\"", "\"NaN\""]),
     ("light below", "theta_i,phi_i,theta_o,phi_o,y\r\n0,0,0,0,1\r\n\r\n1.58,0,0,0,1\r\n", RADIANS, &["line 4", "theta_i", "pi/2 radians", "1.58"]),
     ("viewer below", "theta_i,phi_i,theta_o,phi_o,y\n0,0,90.5,0,1\n", DEGREES, &["line 2", "theta_o", "90 degrees", "90.5"]),
-    ("negative angle", "theta_i,phi_i,theta_o,phi_o,y\n-0.1,0,0,0,1\n", RADIANS, &["line 2", "theta_i", "-0.1"]),
+    ("negative angle below", "theta_i,phi_i,theta_o,phi_o,y\n-1.6,0,0,0,1\n", RADIANS, &["line 2", "theta_i", "-1.6"]),
     ("long vector", "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z,y\n0,0,1,0,0,1,1\n0,0,1,1,0,1,1\n", RADIANS, &["line 3", "wo", "unit vector", "1.41"]),
     ("no vector", "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z,y\n0,0,0,0,0,1,1\n", RADIANS, &["line 2", "wi", "length 0"]),
     ("vector below", "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z,y\n0,0,1,0,0,-1,1\n", RADIANS, &["line 2", "wo above", "-1"]),

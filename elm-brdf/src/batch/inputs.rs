@@ -1,9 +1,12 @@
 //! The networks' inputs from columns of directions. Plain loops over a block, which the compiler
 //! turns into vector code; only the sets that have an angle for an input take arc tangents.
 
+use ndarray::Array2;
+
 use super::real::Real;
-use super::{Block, ROWS};
+use super::{Block, Columns, ROWS};
 use crate::features::Features;
+use crate::geometry::Pair;
 
 /// Fills a block for each input of the set. The same as
 /// [`Features::compute`](crate::features::Features::compute) but for rounding.
@@ -73,6 +76,27 @@ pub(super) fn compute<A: Real>(set: Features, d: &[&[A; ROWS]; 6], x: &mut [Bloc
         // No set has fewer inputs than its arm above takes.
         _ => {}
     }
+}
+
+/// The inputs of each pair of directions, rounded to this precision, shape (pairs, inputs).
+pub(crate) fn inputs_of<A: Real>(set: Features, pairs: &[Pair]) -> Array2<A> {
+    let columns: Columns<A> = Columns::new(pairs);
+    let mut out = Array2::zeros((pairs.len(), set.inputs().len()));
+    let mut x = vec![Block::zero(); set.inputs().len()];
+    for first in (0..pairs.len()).step_by(ROWS) {
+        let count = ROWS.min(pairs.len() - first);
+        let mut block = [[A::zero(); ROWS]; 6];
+        for (to, from) in block.iter_mut().zip(&columns.components) {
+            to[..count].copy_from_slice(&from[first..first + count]);
+        }
+        compute(set, &block.each_ref(), &mut x);
+        for (input, values) in x.iter().enumerate() {
+            for (row, &value) in values.0[..count].iter().enumerate() {
+                out[[first + row, input]] = value;
+            }
+        }
+    }
+    out
 }
 
 /// The sum of light and viewer, and how far apart they are.

@@ -42,6 +42,7 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::error::{Error, Result};
 use crate::geometry::Pair;
 pub(crate) use dense::Dense;
+pub(crate) use inputs::inputs_of;
 pub use packed::Packed;
 pub use real::Real;
 

@@ -10,7 +10,7 @@ use ndarray::{ArrayView2, Axis};
 use super::common::{hint, one_of, progress, usage};
 use super::data::Source;
 use super::samples::{Material, Reading};
-use super::{Failure, models, print};
+use super::{Failure, models, overwrite, print};
 use crate::brdf::Fit;
 use crate::geometry::{Pair, pairs};
 use crate::protocol::{Folds, MaterialScores, cross_validate, cross_validate_samples};
@@ -34,7 +34,8 @@ pub(super) struct Arguments {
     /// 'paper', 'all', or a list of numbers and names, such as '1,39,orange peel'.
     #[arg(long, value_name = "LIST", default_value = "all")]
     materials: String,
-    /// 'all', or a list of models, such as 'gaussian-process,ggx+lambert,elm (paper)'.
+    /// 'all', or a list of models, such as 'gaussian-process,ggx+lambert,elm (paper)': names as the
+    /// table prints them, or without what is in brackets at their end, for all of that name.
     #[arg(long, value_name = "LIST", default_value = "all")]
     models: String,
     /// Number of folds, at least 2.
@@ -68,6 +69,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
     let seeds: Vec<u64> = (arguments.seed..).take(arguments.seeds.into()).collect();
     let names = models::select(&arguments.models, arguments.seed)?;
+    let inputs = match &arguments.samples {
+        Some(name) => arguments.reading.inputs(name),
+        None => Source::find(arguments.reading.data.as_deref())?.files(),
+    };
+    if let Some(dir) = &arguments.plot {
+        overwrite::refuse_folder(
+            dir,
+            &overwrite::names(&plot::NAMES, &["svg", "png"]),
+            &inputs,
+        )?;
+    }
     let subject = match &arguments.samples {
         Some(name) => Subject::Samples(arguments.reading.read(name)?),
         None => {

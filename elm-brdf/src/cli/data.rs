@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use elm_datasets::{Invalid, MaterialId, Measurements, curet, synthetic};
 use etcetera::BaseStrategy;
 
-use super::Failure;
+use super::{Failure, overwrite};
 use crate::error::Error;
 use crate::published;
 
@@ -71,6 +71,14 @@ impl Source {
         match self {
             Self::Curet(dir) => Ok(curet::read(dir, materials, invalid)?),
             Self::Synthetic => Ok(synthetic::measurements(STAND_IN_SEED, materials, invalid)),
+        }
+    }
+
+    /// The files there.
+    pub(super) fn files(&self) -> Vec<PathBuf> {
+        match self {
+            Self::Curet(dir) => overwrite::files_in(dir),
+            Self::Synthetic => Vec::new(),
         }
     }
 

@@ -72,20 +72,27 @@ struct Evaluation {
     stored_floats: usize,
     neurons: usize,
     metrics: Metrics,
+    /// Values of the file that were negative.
+    negative: usize,
+    /// Values of the file that were missing.
+    missing: usize,
+    /// Measurements of the file left out for their values.
+    left_out: usize,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let model: BrdfModel = file::load(&arguments.model)?;
+    let material = arguments.reading.read(&arguments.samples)?;
+    let counts = material.counts(arguments.reading.invalid);
     let Material {
-        samples, source, ..
-    } = arguments.reading.read(&arguments.samples)?;
-    if model.channels() != samples.channels.len() {
-        return Err(Failure::Failed(Error::Elm(elm::Error::Shape {
-            what: "channels of the samples",
-            expected: model.channels(),
-            found: samples.channels.len(),
-        })));
-    }
+        samples,
+        source,
+        invalid,
+        missing,
+        left_out,
+        ..
+    } = material;
+    let samples = model.matched(samples)?;
     let pairs = pairs(&samples.directions);
     let predicted = model.eval(&pairs)?;
     let evaluation = Evaluation {
@@ -94,8 +101,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         channels: samples.channels,
         stored_floats: model.stored_floats(),
         neurons: model.network().hidden().neurons(),
+        negative: invalid,
+        missing,
+        left_out,
     };
-    print(&evaluation.render(arguments.format, &source)?)
+    print(&evaluation.render(arguments.format, &source, &counts)?)
 }
 
 impl Evaluation {
@@ -111,7 +121,7 @@ impl Evaluation {
         ]
     }
 
-    fn render(&self, format: Format, source: &str) -> Result<String, Failure> {
+    fn render(&self, format: Format, source: &str, counts: &str) -> Result<String, Failure> {
         let number = |value: Option<f64>| value.map_or_else(String::new, |v| format!("{v}"));
         Ok(match format {
             Format::Json => {
@@ -133,7 +143,7 @@ impl Evaluation {
             }
             Format::Table => {
                 let mut text = format!(
-                    "{} rows of {source}, channels {}\n{} neurons, {} stored numbers\n",
+                    "{} rows of {source}, channels {}\n{counts}\n{} neurons, {} stored numbers\n",
                     self.rows,
                     self.channels.join(", "),
                     self.neurons,

@@ -4,22 +4,27 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::Failure;
 use super::common::{library, one_of, usage};
+use super::samples::Reading;
+use super::{Failure, overwrite, say};
 use crate::error::Error;
-use crate::export::{ExportError, Format, merl, source};
+use crate::export::{ExportError, Format, Language, header, merl_table, source};
 use crate::file;
-use crate::render::{Supply, scene};
+use crate::geometry::pairs;
+use crate::render::{Supply, default_network, scene};
 
 /// Write a model as source code or as a table, for other programs.
 ///
 /// The source is one function of two directions in the surface's frame, NAME_eval, with the network
-/// inside, in single precision: GLSL, WGSL, HLSL or C. The table is a MERL .binary file.
+/// inside, in single precision: GLSL, WGSL, HLSL or C. It is refused where single precision would
+/// move the values by more than a quarter of the model's own held-out error. The table is a MERL
+/// .binary file, in which light and viewer are one: of a model that tells them apart it holds the
+/// mean.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// A saved model, or 'curet:NAME' or 'csv:FILE' for one that is fitted now.
     model: String,
-    /// The file: .glsl, .wgsl, .hlsl, .c or .binary, unless --format says what it is.
+    /// The file: .glsl, .wgsl, .hlsl, .c, .h (guarded, functions static) or .binary, unless --format says what it is.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Form of the file.
@@ -28,9 +33,8 @@ pub(super) struct Arguments {
     /// What the names of the source's functions begin with.
     #[arg(long, default_value = "elm")]
     name: String,
-    /// Folder of CUReT files, for 'curet:NAME'.
-    #[arg(long, value_name = "DIR")]
-    data: Option<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -38,16 +42,45 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(format) => format,
         None => Format::of(&arguments.output).map_err(usage)?,
     };
-    let asked = asked(&arguments.model);
-    let library = library(arguments.data.as_deref())?;
-    let brdf = library.supply(&asked, Path::new(""))?.brdf;
+    let reading = &arguments.reading;
+    let inputs = match arguments.model.strip_prefix("csv:") {
+        Some(file) => reading.inputs(file),
+        None => reading.inputs(&arguments.model),
+    };
+    overwrite::refuse([arguments.output.as_path()], &inputs)?;
+    let brdf = match arguments.model.strip_prefix("csv:") {
+        Some(file) => {
+            let samples = reading.read(file)?.samples.in_rgb_order();
+            let pairs = pairs(&samples.directions);
+            default_network(pairs.len(), None).fit(&pairs, samples.values.view())?
+        }
+        None => {
+            let library = library(reading.data.as_deref())?;
+            library
+                .supply(&asked(&arguments.model), Path::new(""))?
+                .brdf
+        }
+    };
     match format {
-        Format::Merl => merl(&*brdf)?.write(&arguments.output)?,
+        Format::Merl => {
+            let (table, apart) = merl_table(&*brdf)?;
+            table.write(&arguments.output)?;
+            if apart > 0.0 {
+                say(&format!(
+                    "note: the model tells light from viewer, and a MERL table cannot: it holds the \
+                     mean of both orders, which differ by {:.2} % (root mean square)",
+                    100.0 * apart
+                ));
+            }
+        }
         Format::Source(language) => {
             let network = brdf
                 .as_network()
                 .ok_or(Error::Export(ExportError::NoNetwork))?;
-            let text = source(network, language, &arguments.name)?;
+            let mut text = source(network, language, &arguments.name)?;
+            if arguments.output.extension().is_some_and(|e| e == "h") && language == Language::C {
+                text = header(&text, &arguments.name);
+            }
             file::replace(&arguments.output, text.as_bytes())?;
         }
     }
@@ -60,10 +93,6 @@ fn asked(model: &str) -> scene::Material {
     match model.split_once(':') {
         Some(("curet", name)) => scene::Material {
             curet: Some(name.to_owned()),
-            ..none
-        },
-        Some(("csv", file)) => scene::Material {
-            csv: Some(file.into()),
             ..none
         },
         _ => scene::Material {

@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::common::{one_of, usage};
 use super::samples::{Material, Reading};
-use super::{Failure, print};
+use super::{Failure, overwrite, print};
 use crate::albedo;
 use crate::error::Error;
 use crate::features::Features;
@@ -60,9 +60,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.neurons == Some(0) {
         return Err(usage("--neurons is 0, expected at least 1"));
     }
+    let mut inputs = arguments.reading.inputs(&arguments.samples);
+    inputs.extend(arguments.prior.clone());
+    overwrite::refuse([arguments.output.as_path()], &inputs)?;
+    let material = arguments.reading.read(&arguments.samples)?;
+    let counts = material.counts(arguments.reading.invalid);
     let Material {
         samples, source, ..
-    } = arguments.reading.read(&arguments.samples)?;
+    } = material;
     let prior: Option<Prior> = match &arguments.prior {
         Some(path) => Some(file::load(path)?),
         None => None,
@@ -87,7 +92,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     about.channels = samples.channels;
     let model = model.with_provenance(about);
     model.save(&arguments.output).map_err(Error::from)?;
-    let mut text = describe(&model, seconds);
+    let mut text = describe(&model, &counts, seconds);
     if quality::in_one_plane(&pairs) {
         text.push_str(ONE_PLANE);
     }
@@ -142,10 +147,11 @@ fn number(value: f64) -> String {
     }
 }
 
-fn describe(model: &BrdfModel, seconds: f64) -> String {
+fn describe(model: &BrdfModel, counts: &str, seconds: f64) -> String {
     let about = model.provenance();
     let mut text = format!(
         "{} measurements of {}, channels {}\n\
+         {counts}\n\
          {} neurons on '{}', {} stored numbers, fitted in {seconds:.3} s\n",
         about.rows,
         about.data,

@@ -7,7 +7,7 @@ use elm_datasets::Invalid;
 
 use super::common::{hint, progress};
 use super::data::Source;
-use super::{Failure, print};
+use super::{Failure, overwrite, print};
 use crate::error::Error;
 use crate::export::ExportError;
 use crate::gallery::{self, Exhibit};
@@ -41,6 +41,10 @@ const FOLDS: (usize, u64) = (10, 1);
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let source = Source::find(arguments.data.as_deref())?;
     let materials = source.select(&arguments.materials)?;
+    let pictures = (1..=materials.len()).map(|number| format!("sphere-{number:02}.png"));
+    let mut names: Vec<String> = pictures.collect();
+    names.push("index.html".to_owned());
+    overwrite::refuse_folder(&arguments.out, &names, &source.files())?;
     let data = source.load(&materials, Invalid::Clamp)?;
     hint(&source);
     let network = default_network(data.directions.len(), arguments.neurons);

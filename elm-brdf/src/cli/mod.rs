@@ -11,6 +11,7 @@ mod fetch;
 mod fit;
 mod gallery;
 mod models;
+mod overwrite;
 mod pareto;
 mod prior;
 mod render;

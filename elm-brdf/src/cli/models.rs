@@ -80,16 +80,17 @@ pub(super) fn named(name: &str, seed: u64) -> Result<Reference, Failure> {
     }
 }
 
-/// The models of these names, on all the inputs and targets that they come with.
+/// The models of these names: with the inputs and target in brackets that a table prints, or on all the inputs and targets that they come with.
 pub(super) fn select(list: &str, seed: u64) -> Result<Vec<Reference>, Failure> {
     let mut models = all(seed);
     if list.trim() == "all" {
         return Ok(models);
     }
-    let names: Vec<&str> = list.split(',').map(str::trim).collect();
+    let names = outside_brackets(list);
+    let is = |model: &Reference, name: &str| model.name == name || model.full_name() == name;
     if let Some(&unknown) = names
         .iter()
-        .find(|&&name| models.iter().all(|model| model.name != name))
+        .find(|&&name| !models.iter().any(|model| is(model, name)))
     {
         let mut known: Vec<String> = models.into_iter().map(|model| model.name).collect();
         known.sort_unstable();
@@ -100,8 +101,22 @@ pub(super) fn select(list: &str, seed: u64) -> Result<Vec<Reference>, Failure> {
             expected: known.join(", "),
         }));
     }
-    models.retain(|model| names.contains(&model.name.as_str()));
+    models.retain(|model| names.iter().any(|name| is(model, name)));
     Ok(models)
+}
+
+/// The parts of a list between commas that are not in brackets, as some names have them.
+fn outside_brackets(list: &str) -> Vec<&str> {
+    let mut depth = 0_usize;
+    let parts = list.split(|c: char| {
+        match c {
+            '(' => depth += 1,
+            ')' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        c == ',' && depth == 0
+    });
+    parts.map(str::trim).collect()
 }
 
 /// The paper's network, and the same idea with inputs, target and ridge that suit the task.

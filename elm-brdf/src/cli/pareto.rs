@@ -8,7 +8,7 @@ use clap::Args;
 use super::common::{hint, one_of, progress, usage};
 use super::data::Source;
 use super::samples::Reading;
-use super::{Failure, print};
+use super::{Failure, overwrite, print};
 use crate::error::Error;
 use crate::file;
 use crate::geometry::pairs;
@@ -87,6 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Metric::LogCosine
     });
     let candidates = candidates(arguments, metric)?;
+    refuse_inputs(arguments)?;
     let mut subjects = Vec::new();
     for (index, name) in arguments.samples.iter().enumerate() {
         let test = arguments.test.get(index).map(String::as_str);
@@ -126,6 +127,25 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     progress.finish_and_clear();
     print(&text)
+}
+
+/// Refuses a folder for results in which one of them is an input.
+fn refuse_inputs(arguments: &Arguments) -> Result<(), Failure> {
+    let reading = &arguments.reading;
+    let mut inputs = arguments.nbrdf.clone().into_iter().collect::<Vec<_>>();
+    for name in arguments.samples.iter().chain(&arguments.test) {
+        inputs.extend(reading.inputs(name));
+        inputs.extend(test_beside(name).map(Into::into));
+    }
+    if arguments.samples.is_empty() {
+        inputs.extend(Source::find(reading.data.as_deref())?.files());
+    }
+    let names = overwrite::names(&["pareto"], &["csv", "json", "svg", "png"]);
+    overwrite::refuse_folder(&arguments.out, &names, &inputs)?;
+    for name in &arguments.samples {
+        overwrite::refuse_folder(&arguments.out.join(stem(name)), &names, &inputs)?;
+    }
+    Ok(())
 }
 
 fn candidates(arguments: &Arguments, metric: Metric) -> Result<Vec<pareto::Candidate>, Failure> {
@@ -172,7 +192,9 @@ fn test_beside(samples: &str) -> Option<String> {
 }
 
 fn of_samples(arguments: &Arguments, name: &str, test: Option<&str>) -> Result<Subject, Failure> {
-    let material = arguments.reading.read(name)?;
+    let mut material = arguments.reading.read(name)?;
+    // As published weights have them.
+    material.samples = material.samples.in_rgb_order();
     let (all, values) = (
         pairs(&material.samples.directions),
         material.samples.values.view(),
@@ -181,21 +203,18 @@ fn of_samples(arguments: &Arguments, name: &str, test: Option<&str>) -> Result<S
     let (problem, how) = match &test {
         Some(test) => {
             let judges = arguments.reading.read(test)?;
-            let expected = material.samples.values.ncols();
-            let found = judges.samples.values.ncols();
-            if expected != found {
-                return Err(Error::Elm(elm::Error::Shape {
-                    what: "channels of the samples that judge",
-                    expected,
-                    found,
-                })
-                .into());
-            }
+            let judges = judges
+                .samples
+                .matched(&material.samples.channels)
+                .ok_or_else(|| Error::ChannelNames {
+                    model: material.samples.channels.join(", "),
+                    samples: judges.samples.channels.join(", "),
+                })?;
             let problem = Problem {
                 train: all,
                 train_values: values.to_owned(),
-                test: pairs(&judges.samples.directions),
-                test_values: judges.samples.values,
+                test: pairs(&judges.directions),
+                test_values: judges.values,
             };
             (problem, format!("judged on {test}"))
         }

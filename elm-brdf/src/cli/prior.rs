@@ -9,7 +9,7 @@ use ndarray::{Axis, concatenate};
 
 use super::common::{hint, usage};
 use super::data::Source;
-use super::{Failure, print};
+use super::{Failure, overwrite, print};
 use crate::error::Error;
 use crate::geometry::pairs;
 use crate::prior::PriorParams;
@@ -58,6 +58,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(usage("--neurons is 0, expected at least 1"));
     }
     let source = Source::find(build.data.as_deref())?;
+    overwrite::refuse([build.output.as_path()], &source.files())?;
     hint(&source);
     let mut materials = source.select(&build.materials)?;
     let mut left_out = Vec::new();

@@ -7,7 +7,8 @@ use clap::builder::PossibleValuesParser;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::common::library;
-use super::{Failure, print, say};
+use super::data::Source;
+use super::{Failure, overwrite, print, say};
 use crate::error::Error;
 use crate::file;
 use crate::render::scene::Image;
@@ -79,6 +80,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
             .into(),
     };
     arguments.amend(&mut sheet);
+    let mut inputs = Vec::new();
+    for scene in sheet.scenes() {
+        inputs.extend(overwrite::of_scene(Path::new(&arguments.scene), scene));
+    }
+    inputs.extend(Source::find(arguments.data.as_deref())?.files());
+    let outputs = std::iter::once(&arguments.output).chain(&arguments.account);
+    overwrite::refuse(outputs.map(PathBuf::as_path), &inputs)?;
     let library = library(arguments.data.as_deref())?;
     let options = Options {
         savings: arguments.savings(),

@@ -10,7 +10,7 @@ use elm_datasets::{Invalid, Measurements};
 
 use super::common::{hint, one_of, progress, usage};
 use super::data::Source;
-use super::{Failure, models, print};
+use super::{Failure, models, overwrite, print};
 use crate::brdf::Fit;
 use crate::model::{BrdfParams, ScaledOnce};
 use crate::protocol::{Folds, MaterialScores, cross_validate};
@@ -224,6 +224,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let protocol = model.protocol(arguments)?;
 
     let source = Source::find(arguments.data.as_deref())?;
+    let files = source.files();
+    if let Some(dir) = &arguments.out {
+        let names = overwrite::names(&["reproduce"], &["txt", "md", "csv", "json"]);
+        overwrite::refuse_folder(dir, &names, &files)?;
+    }
+    if let Some(dir) = &arguments.plot {
+        overwrite::refuse_folder(
+            dir,
+            &overwrite::names(&plot::NAMES, &["svg", "png"]),
+            &files,
+        )?;
+    }
     let materials = source.select(&arguments.materials)?;
     let data = source.load(&materials, arguments.invalid)?;
     let load = start.elapsed().as_secs_f64();

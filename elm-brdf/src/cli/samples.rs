@@ -4,12 +4,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use clap::builder::PossibleValuesParser;
 use elm_datasets::scattered::{self, AngleUnit};
 use elm_datasets::{Invalid, MaterialId, OpenOptions, Samples, Sampling, open, paint};
 
-use super::Failure;
 use super::common::one_of;
 use super::data::Source;
+use super::{Failure, say};
 
 /// How many rows a formula or a table is looked up at unless said otherwise.
 const ROWS: usize = 20_000;
@@ -24,13 +25,25 @@ pub(super) struct Reading {
     /// Angles of a CSV file are in degrees rather than radians.
     #[arg(long)]
     degrees: bool,
-    /// Values of a CSV file are BRDF times the cosine of theta_i.
-    #[arg(long)]
-    cosine_weighted: bool,
+    /// Values of a CSV file are BRDF times the cosine of theta_i, or of theta_o, the scatter angle,
+    /// with --cosine-weighted=theta_o.
+    #[arg(long, value_name = "ANGLE", num_args = 0..=1, require_equals = true,
+          default_missing_value = "theta_i",
+          value_parser = PossibleValuesParser::new(["theta_i", "theta_o"]))]
+    cosine_weighted: Option<String>,
+    /// The channels to take, in this order: columns of a CSV file, colours or wavelengths, with
+    /// commas between. All columns that can be reflectance if not given.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    channels: Vec<String>,
+    /// Columns of a CSV file (or channels of another file) to leave out, with commas between.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    ignore: Vec<String>,
     /// Rows to look a table (MERL, RGL) or a formula up at.
     #[arg(long, value_name = "N", default_value_t = ROWS)]
     rows: usize,
     /// What to do with negative BRDF values: set them to 0, keep them, or drop the measurement.
+    /// Measurements without a number (NaN, an empty cell) are left out in any case, and so are
+    /// those of a negative number that stands for none, such as -999, unless all are kept.
     #[arg(long, value_name = "WAY", default_value = "clamp",
           value_parser = one_of::<Invalid>(Invalid::ALL.map(Invalid::name)))]
     pub(super) invalid: Invalid,
@@ -51,6 +64,33 @@ pub(super) struct Material {
     pub(super) samples: Samples,
     /// Negative values met.
     pub(super) invalid: usize,
+    /// Values that were missing: without a number, or a number that stands for none.
+    pub(super) missing: usize,
+    /// The negative numbers that stood for none.
+    pub(super) fills: Vec<f64>,
+    /// Measurements left out for their values.
+    pub(super) left_out: usize,
+}
+
+impl Material {
+    /// How many values were missing or negative, and what became of them.
+    pub(super) fn counts(&self, way: Invalid) -> String {
+        let fills: Vec<String> = self.fills.iter().map(f64::to_string).collect();
+        let standing = match fills.as_slice() {
+            [] => String::new(),
+            _ => format!(" (no number, or {})", fills.join(", ")),
+        };
+        let treated = match (self.invalid, way) {
+            (0, _) => "",
+            (_, Invalid::Clamp) => ", set to 0",
+            (_, Invalid::Keep) => ", kept",
+            (_, Invalid::Drop) => ", their measurements left out",
+        };
+        format!(
+            "{} values missing{standing}, {} negative{treated}; {} measurements left out",
+            self.missing, self.invalid, self.left_out
+        )
+    }
 }
 
 impl Reading {
@@ -69,7 +109,12 @@ impl Reading {
                 } else {
                     AngleUnit::Radians
                 },
-                cosine_weighted: self.cosine_weighted,
+                cosine_weighted: self.cosine_weighted.as_deref() == Some("theta_i"),
+            },
+            columns: scattered::Columns {
+                channels: self.channels.clone(),
+                ignore: self.ignore.clone(),
+                scatter_cosine: self.cosine_weighted.as_deref() == Some("theta_o"),
             },
             sampling: Sampling::Random {
                 rows: self.rows,
@@ -80,15 +125,40 @@ impl Reading {
         };
         let path = Path::new(name);
         let opened = open(path, &options)?;
+        for note in &opened.notes {
+            say(&format!("note: {}: {note}", path.display()));
+        }
         let stem = path.file_stem().unwrap_or(path.as_os_str());
-        Ok(Material {
+        let material = Material {
             name: stem.to_string_lossy().into_owned(),
             id: None,
             source: format!("{} ({})", path.display(), opened.format),
             synthetic: false,
             samples: opened.samples,
             invalid: opened.invalid,
-        })
+            missing: opened.missing,
+            fills: opened.fills,
+            left_out: opened.left_out,
+        };
+        if material.missing > 0 {
+            say(&format!(
+                "note: {}: {}",
+                path.display(),
+                material.counts(self.invalid)
+            ));
+        }
+        Ok(material)
+    }
+
+    /// The files that [`read`](Self::read) reads for `name`.
+    pub(super) fn inputs(&self, name: &str) -> Vec<PathBuf> {
+        if name.starts_with("curet:") {
+            return Source::find(self.data.as_deref()).map_or_else(|_| Vec::new(), |s| s.files());
+        }
+        if name.starts_with("synthetic:") {
+            return Vec::new();
+        }
+        vec![name.into()]
     }
 
     fn curet(&self, material: &str) -> Result<Material, Failure> {
@@ -108,6 +178,7 @@ impl Reading {
             )));
         };
         let synthetic = source == Source::Synthetic;
+        let rows = samples.directions.len();
         Ok(Material {
             name: of.name.clone(),
             id: (!synthetic).then_some(id),
@@ -115,6 +186,9 @@ impl Reading {
             synthetic,
             samples,
             invalid: measurements.invalid,
+            missing: 0,
+            fills: Vec::new(),
+            left_out: measurements.directions.len() - rows,
         })
     }
 
@@ -131,6 +205,9 @@ impl Reading {
             synthetic: true,
             samples: paint::samples(self.rows, 1)?,
             invalid: 0,
+            missing: 0,
+            fills: Vec::new(),
+            left_out: 0,
         })
     }
 }

@@ -34,6 +34,7 @@ mod activations;
 mod dialect;
 mod inputs;
 mod network;
+mod precision;
 mod write;
 
 use std::path::{Path, PathBuf};
@@ -44,11 +45,13 @@ use elm_datasets::merl::Merl;
 use thiserror::Error;
 
 pub use dialect::Language;
-pub use write::source;
+pub use precision::{SinglePrecision, check_precision};
+pub use write::{header, source};
 
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};
-use crate::geometry::pairs;
+use crate::geometry::{Pair, pairs};
+use crate::model::BrdfModel;
 
 /// What a model can be exported to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -151,6 +154,20 @@ pub enum ExportError {
         /// The file.
         path: PathBuf,
     },
+    /// A model that single precision would spoil.
+    #[error(
+        "single precision would move its values by {found:.2e} 1/sr, more than {}: fit fewer neurons \
+         (fit --neurons N), or export a table, which is made in double precision (--format merl)",
+        precision::allowed(*limit, *held_out)
+    )]
+    Precision {
+        /// Root mean square of what it would move values by, in 1/sr.
+        found: f64,
+        /// The most that it may, in 1/sr.
+        limit: f64,
+        /// The model's own held-out RMSE, in 1/sr, where it is known.
+        held_out: Option<f64>,
+    },
     /// A model that is no network.
     #[error("only a network can be exported as source")]
     NoNetwork,
@@ -159,12 +176,31 @@ pub enum ExportError {
 /// The model in the format of the MERL database; one channel stands for all three. Negative
 /// values become 0, and what lies below the horizon has no value.
 ///
+/// A cell of such a table is at once a pair of directions and the same with light and viewer
+/// exchanged, for it knows the azimuth of the difference angle from 0 to 180 degrees only. A model
+/// that tells the two apart is put in as the mean of both.
+///
 /// # Errors
 /// [`Error::Channels`] for a model of another number of channels than 1 or 3; whatever the model's
 /// own evaluation reports.
 pub fn merl(brdf: &dyn Brdf) -> Result<Merl> {
+    Ok(merl_table(brdf)?.0)
+}
+
+/// As [`merl`], with how far the model is from reciprocity over the cells of the table: the root
+/// mean square of the difference that exchanging light and viewer makes, as a part of that of the
+/// values. 0 for a model that is reciprocal.
+///
+/// # Errors
+/// As for [`merl`].
+pub fn merl_table(brdf: &dyn Brdf) -> Result<(Merl, f64)> {
     /// Pairs at a time.
     const BLOCK: usize = 1 << 15;
+    let reordered = brdf.as_network().map(BrdfModel::in_rgb_order).transpose()?;
+    let brdf = match &reordered {
+        Some(network) => network as &dyn Brdf,
+        None => brdf,
+    };
     let channels = brdf.channels();
     if channels != 1 && channels != 3 {
         return Err(Error::Channels { channels });
@@ -176,14 +212,42 @@ pub fn merl(brdf: &dyn Brdf) -> Result<Merl> {
         asked.push(*directions);
         [0.0; 3]
     });
+    let known = brdf
+        .as_network()
+        .is_some_and(|m| m.features().is_reciprocal());
     let mut answers = Vec::with_capacity(asked.len());
+    let (mut differences, mut squares) = (0.0, 0.0);
     for block in asked.chunks(BLOCK) {
-        for row in brdf.eval(&pairs(block))?.rows() {
-            let value = |channel: usize| row[channel.min(channels - 1)].max(0.0);
-            answers.push([value(0), value(1), value(2)]);
+        let pairs = pairs(block);
+        let values = brdf.eval(&pairs)?;
+        let exchanged = if known {
+            None
+        } else {
+            let swapped: Vec<Pair> = pairs.iter().map(|pair| pair.swapped()).collect();
+            Some(brdf.eval(&swapped)?)
+        };
+        for row in 0..pairs.len() {
+            answers.push([0, 1, 2].map(|channel: usize| {
+                let place = (row, channel.min(channels - 1));
+                let value = values[place].max(0.0);
+                let Some(exchanged) = &exchanged else {
+                    return value;
+                };
+                let other = exchanged[place].max(0.0);
+                let mean = 0.5 * value + 0.5 * other;
+                differences += (value - other) * (value - other);
+                squares += mean * mean;
+                mean
+            }));
         }
     }
     let mut answers = answers.into_iter();
     // Both passes ask alike, so there is an answer for every question.
-    Ok(Merl::from_fn(|_| answers.next().unwrap_or([f64::NAN; 3])))
+    let table = Merl::from_fn(|_| answers.next().unwrap_or([f64::NAN; 3]));
+    let apart = if differences > 0.0 {
+        (differences / f64::max(squares, f64::MIN_POSITIVE)).sqrt()
+    } else {
+        0.0
+    };
+    Ok((table, apart))
 }

@@ -7,6 +7,7 @@ use super::activations;
 use super::dialect::Language;
 use super::inputs;
 use super::network::{Network, Neuron, Output};
+use super::precision;
 use crate::error::{Error, Result};
 use crate::link::Channel;
 use crate::model::BrdfModel;
@@ -20,17 +21,23 @@ use crate::model::BrdfModel;
 /// | HLSL | `float3 NAME_eval(float3 light, float3 viewer)` |
 /// | C | `void NAME_eval(const float light[3], const float viewer[3], float rgb[3])` |
 ///
+/// Three channels that are called by colours or wavelengths are red, green and blue by that,
+/// whatever their order.
+///
 /// # Errors
 /// [`ExportError`] for a model with a piece that has no source, for a number beyond single
-/// precision and for a name that is no name; [`Error::Channels`] for another number of channels
+/// precision, for a name that is no name, and for one that single precision would spoil
+/// ([`check_precision`](super::check_precision)); [`Error::Channels`] for another number of channels
 /// than 1 or 3.
 pub fn source(model: &BrdfModel, language: Language, name: &str) -> Result<String> {
     check_name(name)?;
+    let model = &model.in_rgb_order()?;
     let network = Network::new(model)?;
     let channels = network.outputs.len();
     if channels != 1 && channels != 3 {
         return Err(Error::Channels { channels });
     }
+    precision::check_precision(model)?;
     let mut writer = Writer {
         language,
         name,
@@ -39,6 +46,27 @@ pub fn source(model: &BrdfModel, language: Language, name: &str) -> Result<Strin
     };
     writer.whole()?;
     Ok(writer.out)
+}
+
+/// C source as a header: guarded against being included twice, and with functions of its own for
+/// each file that includes it.
+#[must_use]
+pub fn header(source: &str, name: &str) -> String {
+    let guard = format!("{}_EVAL_H", name.to_uppercase());
+    let public = format!("void {name}_eval(");
+    let own = format!("static inline void {name}_eval(");
+    // The function's declaration and its definition begin lines; nothing else does.
+    let body: Vec<String> = source
+        .lines()
+        .map(|line| match line.strip_prefix(&public) {
+            Some(rest) => format!("{own}{rest}"),
+            None => line.to_owned(),
+        })
+        .collect();
+    format!(
+        "#ifndef {guard}\n#define {guard}\n\n{}\n\n#endif\n",
+        body.join("\n")
+    )
 }
 
 /// A letter, then letters, digits and single underscores, as all the languages have it.

@@ -105,6 +105,7 @@ impl Supply for Only<'_> {
             brdf: Box::new(self.0.clone()),
             origin: String::new(),
             name: None,
+            notes: Vec::new(),
         })
     }
 }

@@ -9,6 +9,7 @@
 //! [link](crate::link) keeps it between 0 and [`Link::HEADROOM`](crate::link::Link::HEADROOM) times
 //! the largest value measured. It is finite for every pair of directions.
 
+mod channels;
 mod file;
 mod layer;
 mod scaled_once;

@@ -172,8 +172,21 @@ fn default_up() -> Triple {
 pub struct Material {
     /// A material of CUReT, by number or name; of the stand-in if CUReT's files are not at hand.
     pub curet: Option<String>,
-    /// Measurements in a CSV file.
+    /// Measurements in a CSV file, or in another that `fit` reads.
     pub csv: Option<PathBuf>,
+    /// Whether the angles of a CSV file are in degrees.
+    #[serde(default)]
+    pub degrees: bool,
+    /// Whose cosine the values of a CSV file are BRDF times of: `theta_i` or `theta_o`.
+    pub cosine_weighted: Option<String>,
+    /// Channels to take of a file of measurements, in this order.
+    #[serde(default)]
+    pub channels: Vec<String>,
+    /// Columns to leave out of one.
+    #[serde(default)]
+    pub ignore: Vec<String>,
+    /// What to do with negative values in one: `clamp` (if not given), `keep` or `drop`.
+    pub invalid: Option<String>,
     /// What is fitted to measurements: `elm` (if not given), `interpolation`, which passes through
     /// them, or one of the names of [`reference::Analytic`](crate::reference::Analytic).
     pub fit: Option<String>,

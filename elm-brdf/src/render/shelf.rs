@@ -31,6 +31,8 @@ pub(crate) struct Stocked {
     pub(crate) origin: String,
     /// What the data call it.
     pub(crate) title: Option<String>,
+    /// What was assumed of the data.
+    pub(crate) notes: Vec<String>,
     /// How long it took.
     pub(crate) seconds: f64,
 }
@@ -99,6 +101,7 @@ impl<'a> Shelf<'a> {
                 material,
                 origin: supplied.origin,
                 title: supplied.name,
+                notes: supplied.notes,
                 seconds: start.elapsed().as_secs_f64(),
             })
         };

@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 
 use elm::solve::Ridge;
 use elm::{Activation, ElmParams};
-use elm_datasets::{Directions, Invalid, Measurements, Samples, analytic, curet, synthetic};
+use elm_datasets::scattered::{self, AngleUnit};
+use elm_datasets::{
+    Directions, Invalid, Measurements, OpenOptions, Samples, analytic, curet, synthetic,
+};
 use ndarray::{Array2, ArrayView2, Axis};
 
 use super::scene;
@@ -24,6 +27,8 @@ pub struct Supplied {
     pub origin: String,
     /// What the data call the material, if they do.
     pub name: Option<String>,
+    /// What was assumed of the data.
+    pub notes: Vec<String>,
 }
 
 /// Something that makes the models of materials.
@@ -192,6 +197,7 @@ impl Method<'_> {
             brdf,
             origin: format!("{how} {data}"),
             name: None,
+            notes: Vec::new(),
         })
     }
 }
@@ -224,7 +230,11 @@ impl Supply for Library {
             }
             (None, Some(file), None, None) => {
                 let method = self.method(material)?;
-                method.fit(&read_csv(&dir.join(file))?, &file.display().to_string())
+                let (samples, notes) = read(&dir.join(file), material)?;
+                Ok(Supplied {
+                    notes,
+                    ..method.fit(&samples, &file.display().to_string())?
+                })
             }
             (None, None, Some(file), None) => {
                 let path = dir.join(file);
@@ -232,13 +242,15 @@ impl Supply for Library {
                 Ok(Supplied {
                     origin: format!("{} ({})", file.display(), model.provenance().data),
                     name: None,
-                    brdf: Box::new(model),
+                    brdf: Box::new(model.in_rgb_order()?),
+                    notes: Vec::new(),
                 })
             }
             (None, None, None, Some(name)) => Ok(Supplied {
                 brdf: Box::new(Analytic::from_scene(name, material)?),
                 origin: "a formula".to_owned(),
                 name: None,
+                notes: Vec::new(),
             }),
             _ => Err(Error::MaterialSource),
         }
@@ -253,42 +265,49 @@ fn no_measurements(data: &str) -> Error {
     }
 }
 
-/// Samples from a CSV file with columns `theta_i, phi_i, theta_o, phi_o` in radians and one value
-/// column or three, in 1/sr without the cosine.
-fn read_csv(path: &Path) -> Result<Samples> {
-    let table = elm_datasets::csv::Table::read(path)?;
-    let angles = ["theta_i", "phi_i", "theta_o", "phi_o"];
-    let missing = angles
-        .iter()
-        .find(|name| !table.columns.iter().any(|c| c == **name));
-    if let Some(column) = missing {
-        return Err(Error::MissingColumn {
-            path: path.to_owned(),
-            column,
+/// Samples from a file, read as every command reads it, with red before green before blue; and
+/// what was assumed of them.
+fn read(path: &Path, material: &scene::Material) -> Result<(Samples, Vec<String>)> {
+    let weighted = material.cosine_weighted.as_deref();
+    if let Some(other) = weighted.filter(|angle| !["theta_i", "theta_o"].contains(angle)) {
+        return Err(Error::UnknownName {
+            what: "cosine",
+            name: other.to_owned(),
+            expected: "theta_i, theta_o".to_owned(),
         });
     }
-    let (values, angle_values) = table.split_target(&angles)?;
-    let directions = angle_values
-        .rows()
-        .into_iter()
-        .map(|row| Directions {
-            theta_i: row[0],
-            phi_i: row[1],
-            theta_o: row[2],
-            phi_o: row[3],
-        })
-        .collect();
-    let channels = table
-        .columns
-        .iter()
-        .filter(|name| !angles.contains(&name.as_str()))
-        .cloned()
-        .collect();
-    Ok(Samples {
-        directions,
-        values,
-        channels,
-    })
+    let invalid: Invalid = match &material.invalid {
+        Some(way) => way.parse()?,
+        None => Invalid::default(),
+    };
+    let options = OpenOptions {
+        scattered: scattered::Options {
+            unit: if material.degrees {
+                AngleUnit::Degrees
+            } else {
+                AngleUnit::Radians
+            },
+            cosine_weighted: weighted == Some("theta_i"),
+        },
+        columns: scattered::Columns {
+            channels: material.channels.clone(),
+            ignore: material.ignore.clone(),
+            scatter_cosine: weighted == Some("theta_o"),
+        },
+        invalid,
+        ..OpenOptions::default()
+    };
+    let opened = elm_datasets::open(path, &options)?;
+    let mut notes: Vec<String> = opened.notes.iter().map(ToString::to_string).collect();
+    if opened.missing > 0 {
+        notes.push(format!(
+            "{} values are missing, {} measurements were left out",
+            opened.missing, opened.left_out
+        ));
+    }
+    let noted = |note| format!("{}: {note}", path.display());
+    let notes = notes.into_iter().map(noted).collect();
+    Ok((opened.samples.in_rgb_order(), notes))
 }
 
 /// A pair in angles.

@@ -337,6 +337,10 @@ impl<'a> Picture<'a> {
         for (name, stocked) in shelf.stocked() {
             let Some(stocked) = stocked else { continue };
             account.seconds.materials += stocked.seconds;
+            let noted = stocked.notes.iter();
+            account
+                .notes
+                .extend(noted.map(|note| format!("material '{name}': {note}")));
             let albedo = stocked.material.largest_albedo();
             if albedo > 1.0 {
                 let rescaled = match stocked.material.is_rescaled() {

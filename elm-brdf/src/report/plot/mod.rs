@@ -192,6 +192,14 @@ pub fn write_fitted_lobes(
     write_lobes(dir, title, &panels)
 }
 
+/// The pictures that [`write`] and [`write_lobes`] make, without extensions.
+pub(crate) const NAMES: [&str; 4] = [
+    "predicted-against-measured",
+    "error-by-angle",
+    "error-by-material",
+    "lobes",
+];
+
 /// What drawing comes to on a back end.
 type Drawn<DB> = Result<(), DrawingAreaErrorKind<<DB as DrawingBackend>::ErrorType>>;
 

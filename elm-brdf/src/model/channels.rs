@@ -1,0 +1,61 @@
+//! A model's channels by what they are called.
+
+use elm::Elm;
+use elm_datasets::{Samples, channel};
+use ndarray::Axis;
+
+use super::BrdfModel;
+use crate::brdf::Brdf;
+use crate::error::{Error, Result};
+
+impl BrdfModel {
+    /// The samples with the channels of this model, in its order: matched by name, colour or
+    /// wavelength. A model whose channels have no names takes them as they come.
+    ///
+    /// # Errors
+    /// [`Error::ChannelNames`] for samples that lack one; [`elm::Error::Shape`] for another number
+    /// of channels than that of a model without names.
+    pub fn matched(&self, samples: Samples) -> Result<Samples> {
+        let own = &self.provenance.channels;
+        if own.len() == self.channels() {
+            return samples.matched(own).ok_or_else(|| Error::ChannelNames {
+                model: own.join(", "),
+                samples: samples.channels.join(", "),
+            });
+        }
+        if samples.channels.len() == self.channels() {
+            return Ok(samples);
+        }
+        Err(Error::Elm(elm::Error::Shape {
+            what: "channels of the samples",
+            expected: self.channels(),
+            found: samples.channels.len(),
+        }))
+    }
+
+    /// The model with red first, then green, then blue, where its three channels are called by
+    /// colours or wavelengths; as it is where they are not.
+    ///
+    /// # Errors
+    /// Those of [`Elm::from_parts`], for a network that none of this crate's makes.
+    pub fn in_rgb_order(&self) -> Result<Self> {
+        let places = match channel::rgb(&self.provenance.channels) {
+            Some(places) if self.channels() == 3 && places != [0, 1, 2] => places,
+            _ => return Ok(self.clone()),
+        };
+        let network = Elm::from_parts(
+            self.network.scaler().cloned(),
+            self.network.hidden().clone(),
+            self.network.beta().select(Axis(1), &places),
+            self.network.intercept().select(Axis(0), &places),
+        )?;
+        let mut provenance = self.provenance.clone();
+        provenance.channels = places.map(|p| self.provenance.channels[p].clone()).to_vec();
+        Ok(Self {
+            link: self.link.select(&places),
+            network,
+            provenance,
+            ..self.clone()
+        })
+    }
+}

@@ -1,0 +1,95 @@
+//! What single precision costs: known before anything is exported.
+
+#![allow(clippy::unwrap_used)]
+
+use elm::solve::Ridge;
+use elm::{Activation, ElmParams};
+use elm_brdf::batch::Packed;
+use elm_brdf::brdf::Brdf;
+use elm_brdf::export::{ExportError, Language, source};
+use elm_brdf::features::Features;
+use elm_brdf::geometry::{Pair, cartesian, pairs};
+use elm_brdf::link::Link;
+use elm_brdf::model::{BrdfModel, BrdfParams};
+use elm_datasets::{Invalid, MaterialId, synthetic};
+
+/// A network of sine neurons that hardly differ from each other, so that without a ridge worth the
+/// name their weights nearly cancel.
+fn model(lambda: f64) -> BrdfModel {
+    let data = synthetic::measurements(1, &[MaterialId::new(7).unwrap()], Invalid::Clamp);
+    let samples = data.samples(0).unwrap();
+    let params = BrdfParams {
+        features: Features::ReciprocalCosines,
+        link: Link::default_log(),
+        network: ElmParams::new(120)
+            .activation(Activation::Sine)
+            .scale(0.1)
+            .solver(Ridge::relative(lambda)),
+    };
+    params
+        .fit_model(&pairs(&samples.directions), samples.values.view())
+        .unwrap()
+}
+
+/// Root mean square of the difference between the packed evaluator in `f32` and the model, over a
+/// grid of directions.
+fn measured(model: &BrdfModel) -> f64 {
+    let mut grid = Vec::new();
+    for theta_i in 0..15 {
+        for theta_o in 0..15 {
+            for phi in 0..12 {
+                grid.push(Pair {
+                    incident: cartesian(f64::from(theta_i) * 0.1, 0.0),
+                    outgoing: cartesian(f64::from(theta_o) * 0.1, f64::from(phi) * 0.3),
+                });
+            }
+        }
+    }
+    let single = Packed::<f32>::new(model).unwrap().eval(&grid).unwrap();
+    let difference = single - model.eval(&grid).unwrap();
+    (difference.iter().map(|d| d * d).sum::<f64>() / difference.len() as f64).sqrt()
+}
+
+#[test]
+fn the_error_of_single_precision_is_foretold_within_an_order_of_magnitude() {
+    for lambda in [1e-4, 1e-8, 1e-12] {
+        let model = model(lambda);
+        let (found, measured) = (model.single_precision_error().unwrap(), measured(&model));
+        let ratio = found.rmse / measured;
+        assert!(
+            (0.5..10.0).contains(&ratio),
+            "{lambda}: {found:?} {measured}"
+        );
+        assert!(found.largest >= found.rmse && found.scale > 0.0);
+    }
+}
+
+#[test]
+fn a_model_that_single_precision_would_spoil_is_not_exported() {
+    let good = model(1e-4);
+    for language in [Language::C, Language::Glsl, Language::Hlsl, Language::Wgsl] {
+        assert!(source(&good, language, "m").is_ok());
+        let error = source(&model(1e-14), language, "m").unwrap_err();
+        assert!(
+            matches!(
+                error,
+                elm_brdf::Error::Export(ExportError::Precision { .. })
+            ),
+            "{error}"
+        );
+        let message = error.to_string();
+        assert!(
+            message.contains("--neurons") && !message.contains('\n'),
+            "{message}"
+        );
+    }
+}
+
+#[test]
+fn held_out_errors_set_the_limit_where_there_are_any() {
+    let error = model(1e-4).single_precision_error().unwrap();
+    assert_eq!(error.limit(Some(0.4)), 0.1);
+    assert_eq!(error.limit(None), 0.01 * error.scale);
+    // Of a model that meets its measurements exactly nothing better than roundings is asked.
+    assert_eq!(error.limit(Some(0.0)), 1e-5 * error.scale);
+}

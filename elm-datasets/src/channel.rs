@@ -1,0 +1,438 @@
+//! What the name of a channel says: a colour, a wavelength, or nothing that is known here.
+//!
+//! Channels of different files are matched by this, never by position.
+
+/// What a channel is.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Meaning {
+    /// Red, green or blue: 0, 1 or 2.
+    Primary(usize),
+    /// A wavelength in nm.
+    Wavelength(f64),
+    /// Anything else, in lower case.
+    Other(String),
+}
+
+/// Words of names that are a value of reflectance.
+const VALUES: &[&str] = &[
+    "brdf",
+    "bsdf",
+    "brf",
+    "f",
+    "fr",
+    "value",
+    "values",
+    "val",
+    "reflectance",
+    "refl",
+    "rho",
+    "grey",
+    "gray",
+    "mono",
+    "luminance",
+    "lum",
+    "average",
+    "avg",
+    "mean",
+    "x",
+    "y",
+    "z",
+    "intensity",
+    "signal",
+    "radiance",
+    "measured",
+    "r",
+    "g",
+    "b",
+    "red",
+    "green",
+    "blue",
+    "rgb",
+];
+
+/// Words of names that are no reflectance: of errors, of row numbers, of settings.
+const NO_VALUES: &[&str] = &[
+    "std",
+    "stdev",
+    "stddev",
+    "sd",
+    "sigma",
+    "se",
+    "sem",
+    "error",
+    "err",
+    "errors",
+    "uncertainty",
+    "unc",
+    "uncert",
+    "deviation",
+    "dev",
+    "delta",
+    "variance",
+    "var",
+    "rms",
+    "rmse",
+    "snr",
+    "noise",
+    "tolerance",
+    "ci",
+    "lower",
+    "upper",
+    "row",
+    "rows",
+    "index",
+    "id",
+    "no",
+    "nr",
+    "num",
+    "number",
+    "count",
+    "n",
+    "line",
+    "sample",
+    "time",
+    "timestamp",
+    "date",
+    "seconds",
+    "temperature",
+    "temp",
+    "weight",
+    "weights",
+    "flag",
+    "flags",
+    "quality",
+    "valid",
+    "mask",
+    "pdf",
+    "theta",
+    "phi",
+    "dphi",
+    "azimuth",
+    "elevation",
+    "zenith",
+    "cos",
+    "cosine",
+    "angle",
+    "angles",
+    "deg",
+    "exposure",
+    "gain",
+    "dark",
+    "u",
+    "d",
+    "wavelength",
+    "wavelengths",
+    "lambda",
+    "wl",
+    "btdf",
+    "transmittance",
+];
+
+/// What the name of a column of a table says about it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// Reflectance.
+    Value,
+    /// Certainly none.
+    NoValue,
+    /// The wavelength of the row.
+    Wavelength,
+    /// Nothing that is known here.
+    Unknown,
+}
+
+impl Meaning {
+    /// What a name says: `r`, `Red`, `brdf_g`, `550`, `550nm`, `0.55 um`, `brdf 550 nm`.
+    ///
+    /// ```
+    /// use elm_datasets::channel::Meaning;
+    /// assert_eq!(Meaning::of("Red"), Meaning::Primary(0));
+    /// assert_eq!(Meaning::of("0.55 um"), Meaning::of("550nm"));
+    /// assert_eq!(Meaning::of("Felt"), Meaning::Other("felt".to_owned()));
+    /// ```
+    #[must_use]
+    pub fn of(name: &str) -> Self {
+        let words = words(name);
+        // 'R450' is a reflectance at 450 nm, not a red.
+        if let Some(nm) = wavelength(&words) {
+            return Self::Wavelength(nm);
+        }
+        let primary = |word: &String| match word.as_str() {
+            "r" | "red" => Some(0),
+            "g" | "green" => Some(1),
+            "b" | "blue" => Some(2),
+            _ => None,
+        };
+        let mut primaries = words.iter().filter_map(primary);
+        match (primaries.next(), primaries.next()) {
+            (Some(index), None) => Self::Primary(index),
+            _ => Self::Other(name.trim().to_lowercase()),
+        }
+    }
+
+    /// Whether two names mean the same channel.
+    #[must_use]
+    pub fn is_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            // Printed with fewer digits in one of two files.
+            (Self::Wavelength(a), Self::Wavelength(b)) => (a - b).abs() <= 1e-6 * a.abs(),
+            _ => self == other,
+        }
+    }
+}
+
+/// For each channel of `wanted` its place among `found`, by name, colour or wavelength; a single
+/// channel matches a single one unless both names say that they are different ones. Names that no
+/// one has written down (no names at all) are matched by position.
+///
+/// `None` if a channel of `wanted` is not among `found`, or is there twice.
+///
+/// ```
+/// let names = |list: [&str; 3]| list.map(str::to_owned);
+/// let (rgb, bgr) = (names(["red", "green", "blue"]), names(["b", "g", "r"]));
+/// assert_eq!(elm_datasets::channel::places(&rgb, &bgr), Some(vec![2, 1, 0]));
+/// ```
+#[must_use]
+pub fn places(wanted: &[String], found: &[String]) -> Option<Vec<usize>> {
+    let means = |names: &[String]| names.iter().map(|n| Meaning::of(n)).collect::<Vec<_>>();
+    let (wanted_means, found_means) = (means(wanted), means(found));
+    let by_name: Option<Vec<usize>> = (0..wanted.len())
+        .map(|index| {
+            let by = |same: &dyn Fn(usize) -> bool| {
+                let mut all = (0..found.len()).filter(|&place| same(place));
+                all.next().filter(|_| all.next().is_none())
+            };
+            by(&|place| found[place] == wanted[index])
+                .or_else(|| by(&|place| found_means[place].is_same(&wanted_means[index])))
+        })
+        .collect();
+    if let Some(places) = by_name {
+        let mut seen = places.clone();
+        seen.sort_unstable();
+        seen.dedup();
+        return (seen.len() == places.len()).then_some(places);
+    }
+    // One of the two says wavelengths and the other colours.
+    if let (Some(a), Some(b), 3, 3) = (rgb(wanted), rgb(found), wanted.len(), found.len()) {
+        let mut places = vec![0; 3];
+        for (&to, &from) in a.iter().zip(&b) {
+            places[to] = from;
+        }
+        return Some(places);
+    }
+    match (wanted_means.as_slice(), found_means.as_slice()) {
+        ([a], [b]) if is_unspecific(a) || is_unspecific(b) => Some(vec![0]),
+        _ => None,
+    }
+}
+
+fn is_unspecific(meaning: &Meaning) -> bool {
+    matches!(meaning, Meaning::Other(_))
+}
+
+/// The place of the one channel that a name means, by the name or what it says.
+pub(crate) fn place(name: &str, among: &[String]) -> Option<usize> {
+    let exact = |other: &String| other.trim().eq_ignore_ascii_case(name.trim());
+    if let Some(place) = among.iter().position(exact) {
+        return Some(place);
+    }
+    let meaning = Meaning::of(name);
+    let is = |other: &String| Meaning::of(other).is_same(&meaning);
+    let mut same = (0..among.len()).filter(|&place| is(&among[place]));
+    same.next().filter(|_| same.next().is_none())
+}
+
+/// The places of red, green and blue among three channels: by their colours, or by their
+/// wavelengths, the longest for red. `None` where the names do not say.
+#[must_use]
+pub fn rgb(channels: &[String]) -> Option<[usize; 3]> {
+    if channels.len() != 3 {
+        return None;
+    }
+    let means: Vec<Meaning> = channels.iter().map(|name| Meaning::of(name)).collect();
+    let primary = |index| means.iter().position(|m| *m == Meaning::Primary(index));
+    if let (Some(r), Some(g), Some(b)) = (primary(0), primary(1), primary(2)) {
+        return Some([r, g, b]);
+    }
+    let length = |index: usize| match means[index] {
+        Meaning::Wavelength(nm) => Some(nm),
+        _ => None,
+    };
+    let lengths = [length(0)?, length(1)?, length(2)?];
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| lengths[b].total_cmp(&lengths[a]));
+    (lengths[order[0]] > lengths[order[1]] && lengths[order[1]] > lengths[order[2]])
+        .then_some(order)
+}
+
+/// What the name of a column says.
+pub(crate) fn kind(name: &str) -> Kind {
+    let words = words(name);
+    let is = |list: &[&str], word: &String| list.contains(&word.as_str());
+    let lengths = ["wavelength", "wavelengths", "wave", "lambda", "wl"];
+    if !words.is_empty()
+        && words
+            .iter()
+            .all(|w| is(&lengths, w) || is(&UNITS, w) || w == "in")
+    {
+        return Kind::Wavelength;
+    }
+    if wavelength(&words).is_some() && !words.iter().any(|w| is_no_value(w)) {
+        return Kind::Value;
+    }
+    if words.iter().any(|w| is_no_value(w)) {
+        Kind::NoValue
+    } else if words.iter().any(|w| is(VALUES, w)) {
+        Kind::Value
+    } else {
+        Kind::Unknown
+    }
+}
+
+/// Whether a name is a single word, and one that says something else than reflectance.
+pub(crate) fn is_one_word_for_something_else(name: &str) -> bool {
+    match words(name).as_slice() {
+        [word] => NO_VALUES.contains(&word.as_str()),
+        _ => false,
+    }
+}
+
+/// Words that stand beside a wavelength without making it something else.
+fn is_no_value(word: &str) -> bool {
+    NO_VALUES.contains(&word) && !["lambda", "wl", "wavelength"].contains(&word)
+}
+
+const UNITS: [&str; 6] = ["nm", "um", "\u{b5}m", "\u{3bc}m", "micron", "microns"];
+
+/// Factor to nm that a name's unit asks for; `None` where it names no unit.
+pub(crate) fn unit(name: &str) -> Option<f64> {
+    let words = words(name);
+    let unit = words.iter().find(|word| UNITS.contains(&word.as_str()))?;
+    Some(if unit == "nm" { 1.0 } else { 1000.0 })
+}
+
+/// The wavelength in nm that a name's only number is: with a unit, or of a size that says it.
+fn wavelength(words: &[String]) -> Option<f64> {
+    let mut numbers = words.iter().filter_map(|word| word.parse::<f64>().ok());
+    let number = numbers.next().filter(|_| numbers.next().is_none())?;
+    let unit = words.iter().find(|word| UNITS.contains(&word.as_str()));
+    let nm = match unit.map(String::as_str) {
+        Some("nm") => number,
+        Some(_) => 1000.0 * number,
+        None => in_nm(number)?,
+    };
+    (nm > 0.0 && nm.is_finite()).then_some(nm)
+}
+
+/// A number of optical wavelengths that says itself whether it is in nm or in um.
+pub(crate) fn in_nm(number: f64) -> Option<f64> {
+    if (100.0..=25_000.0).contains(&number) {
+        Some(number)
+    } else if (0.1..=25.0).contains(&number) && number.fract() != 0.0 {
+        Some(1000.0 * number)
+    } else {
+        None
+    }
+}
+
+/// The words of a name: runs of letters and numbers, in lower case.
+fn words(name: &str) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    let mut last = ' ';
+    let name = name.to_lowercase();
+    let mut rest = name.chars().peekable();
+    while let Some(c) = rest.next() {
+        let point =
+            c == '.' && last.is_ascii_digit() && rest.peek().is_some_and(char::is_ascii_digit);
+        let continues = match (last, c) {
+            (_, '.') => point,
+            (l, c) if c.is_ascii_digit() => l.is_ascii_digit() || l == '.',
+            (l, c) => c.is_alphabetic() && l.is_alphabetic(),
+        };
+        match words.last_mut() {
+            Some(word) if continues => word.push(c),
+            _ if c.is_alphanumeric() => words.push(c.to_string()),
+            _ => {}
+        }
+        last = if c == '.' && !point { ' ' } else { c };
+    }
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(list: &[&str]) -> Vec<String> {
+        list.iter().map(|&name| name.to_owned()).collect()
+    }
+
+    #[test]
+    fn names_say_colours_and_wavelengths() {
+        for (name, nm) in [
+            ("550", 550.0),
+            ("550nm", 550.0),
+            ("550.5 nm", 550.5),
+            ("BRDF(632.8nm)", 632.8),
+            ("0.6328um", 632.8),
+            ("lambda_1550", 1550.0),
+            ("10.6 \u{b5}m", 10_600.0),
+            ("R450", 450.0),
+        ] {
+            let found = Meaning::of(name);
+            assert!(found.is_same(&Meaning::Wavelength(nm)), "{name}: {found:?}");
+        }
+        assert_eq!(Meaning::of("brdf_G"), Meaning::Primary(1));
+        assert_eq!(Meaning::of("c1"), Meaning::Other("c1".to_owned()));
+    }
+
+    #[test]
+    fn columns_are_told_apart_by_their_words() {
+        for (name, expected) in [
+            ("brdf", Kind::Value),
+            ("BRDF [1/sr]", Kind::Value),
+            ("r", Kind::Value),
+            ("550 nm", Kind::Value),
+            ("brdf_std", Kind::NoValue),
+            ("std_550", Kind::NoValue),
+            ("u(brdf)", Kind::NoValue),
+            ("row", Kind::NoValue),
+            ("Sample No.", Kind::NoValue),
+            ("theta_h", Kind::NoValue),
+            ("wavelength_nm", Kind::Wavelength),
+            ("Wavelength (um)", Kind::Wavelength),
+            ("lambda", Kind::Wavelength),
+            ("nm", Kind::Wavelength),
+            ("felt", Kind::Unknown),
+        ] {
+            assert_eq!(kind(name), expected, "{name}");
+        }
+    }
+
+    #[test]
+    fn channels_are_matched_by_what_they_are() {
+        let of = |a: &[&str], b: &[&str]| places(&names(a), &names(b));
+        assert_eq!(
+            of(&["r", "g", "b"], &["Blue", "Green", "Red"]),
+            Some(vec![2, 1, 0])
+        );
+        assert_eq!(
+            of(&["450 nm", "650 nm"], &["650", "550", "450"]),
+            Some(vec![2, 0])
+        );
+        assert_eq!(
+            of(&["r", "g", "b"], &["450", "550", "650"]),
+            Some(vec![2, 1, 0])
+        );
+        assert_eq!(of(&["grey"], &["brdf"]), Some(vec![0]));
+        assert_eq!(of(&["450"], &["650"]), None);
+        assert_eq!(of(&["r", "g"], &["r", "b"]), None);
+        assert_eq!(of(&["a", "b", "c"], &["d", "e", "f"]), None);
+        assert_eq!(
+            rgb(&names(&["450 nm", "550 nm", "650 nm"])),
+            Some([2, 1, 0])
+        );
+        assert_eq!(rgb(&names(&["u", "v", "w"])), None);
+    }
+}

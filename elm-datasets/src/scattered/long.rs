@@ -1,0 +1,87 @@
+//! Tables with a row per wavelength, turned into tables with a column per wavelength.
+
+use std::collections::HashMap;
+
+use ndarray::Array2;
+
+use crate::{Directions, Samples, channel};
+
+/// Most wavelengths of a table: a column that has more values than this is none of wavelengths.
+const MOST: usize = 1000;
+
+/// What can be a wavelength, in nm: from a picometre to a metre.
+const LENGTHS: std::ops::RangeInclusive<f64> = 1e-3..=1e9;
+
+/// The samples of a table of which each row has a wavelength, shape (rows, 1): the first `column`
+/// is its name. Wavelengths ascend; a pair of directions that lacks one has NaN there. The n-th
+/// row of a pair and a wavelength belongs with the n-th of the pair's others.
+///
+/// # Errors
+/// The row of a number that is no wavelength, or of one wavelength more than there can be.
+pub(super) fn pivot(
+    samples: &Samples,
+    wavelengths: &[f64],
+    column: &str,
+) -> Result<Samples, (usize, f64)> {
+    let unit = channel::unit(column);
+    let nm = |wavelength: f64| match unit {
+        Some(factor) => factor * wavelength,
+        None => channel::in_nm(wavelength).unwrap_or(wavelength),
+    };
+    let mut distinct: Vec<f64> = Vec::new();
+    let mut places: HashMap<u64, usize> = HashMap::new();
+    for (row, &wavelength) in wavelengths.iter().enumerate() {
+        if !LENGTHS.contains(&nm(wavelength)) {
+            return Err((row, wavelength));
+        }
+        places.entry(wavelength.to_bits()).or_insert_with(|| {
+            distinct.push(wavelength);
+            distinct.len() - 1
+        });
+        if distinct.len() > MOST {
+            return Err((row, wavelength));
+        }
+    }
+    let mut order: Vec<usize> = (0..distinct.len()).collect();
+    order.sort_by(|&a, &b| distinct[a].total_cmp(&distinct[b]));
+    let mut rank = vec![0; order.len()];
+    for (to, &from) in order.iter().enumerate() {
+        rank[from] = to;
+    }
+
+    // How often a pair has had a wavelength, and the row of each pair's n-th time.
+    let mut times: HashMap<([u64; 4], usize), usize> = HashMap::new();
+    let mut rows: HashMap<([u64; 4], usize), usize> = HashMap::new();
+    let mut directions: Vec<Directions> = Vec::new();
+    let mut cells: Vec<(usize, usize, f64)> = Vec::with_capacity(wavelengths.len());
+    for (row, (pair, wavelength)) in samples.directions.iter().zip(wavelengths).enumerate() {
+        let (Some(&place), Some(&value)) = (
+            places.get(&wavelength.to_bits()),
+            samples.values.get((row, 0)),
+        ) else {
+            continue;
+        };
+        // 0 and -0 are one angle.
+        let key = [pair.theta_i, pair.phi_i, pair.theta_o, pair.phi_o].map(|a| (a + 0.0).to_bits());
+        let time = times.entry((key, place)).or_insert(0);
+        let to = *rows.entry((key, *time)).or_insert_with(|| {
+            directions.push(*pair);
+            directions.len() - 1
+        });
+        *time += 1;
+        cells.push((to, rank[place], value));
+    }
+    let mut values = Array2::from_elem((directions.len(), order.len()), f64::NAN);
+    for (row, column, value) in cells {
+        values[[row, column]] = value;
+    }
+    Ok(Samples {
+        directions,
+        values,
+        // Digits that a conversion to nm adds say nothing, a thousandth of a picometre neither.
+        channels: order
+            .iter()
+            .map(|&index| format!("{} nm", (nm(distinct[index]) * 1e6).round() / 1e6))
+            .collect(),
+    })
+}
