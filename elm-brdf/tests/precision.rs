@@ -10,8 +10,10 @@ use elm_brdf::export::{ExportError, Language, source};
 use elm_brdf::features::Features;
 use elm_brdf::geometry::{Pair, cartesian, pairs};
 use elm_brdf::link::Link;
+use elm_brdf::metrics::Metrics;
 use elm_brdf::model::{BrdfModel, BrdfParams};
 use elm_datasets::{Invalid, MaterialId, synthetic};
+use ndarray::array;
 
 /// A network of sine neurons that hardly differ from each other, so that without a ridge worth the
 /// name their weights nearly cancel.
@@ -23,7 +25,7 @@ fn model(lambda: f64) -> BrdfModel {
         link: Link::default_log(),
         network: ElmParams::new(120)
             .activation(Activation::Sine)
-            .scale(0.1)
+            .scale(0.05)
             .solver(Ridge::relative(lambda)),
     };
     params
@@ -51,25 +53,42 @@ fn measured(model: &BrdfModel) -> f64 {
 }
 
 #[test]
-fn the_error_of_single_precision_is_foretold_within_an_order_of_magnitude() {
+fn the_error_of_single_precision_is_foretold_and_not_far_too_large() {
     for lambda in [1e-4, 1e-8, 1e-12] {
         let model = model(lambda);
         let (found, measured) = (model.single_precision_error().unwrap(), measured(&model));
         let ratio = found.rmse / measured;
+        // Each rounding counts at its bound, some 2.5 times its root mean square, and each function
+        // with one more than this evaluator's make; directions near the mirror direction, where
+        // inputs round most, are a quarter of those surveyed.
         assert!(
-            (0.5..10.0).contains(&ratio),
+            (0.5..30.0).contains(&ratio),
             "{lambda}: {found:?} {measured}"
         );
         assert!(found.largest >= found.rmse && found.scale > 0.0);
     }
 }
 
+/// The model with so many times its error of single precision for a held-out RMSE.
+fn with_held_out(model: &BrdfModel, times: f64) -> BrdfModel {
+    let pairs = [Pair {
+        incident: cartesian(0.3, 0.0),
+        outgoing: cartesian(0.5, 1.0),
+    }];
+    let error = times * model.single_precision_error().unwrap().rmse;
+    let mut about = model.provenance().clone();
+    let one = array![[1.0]];
+    about.held_out = Some(Metrics::of(&pairs, (&one + error).view(), one.view()).unwrap());
+    model.clone().with_provenance(about)
+}
+
 #[test]
 fn a_model_that_single_precision_would_spoil_is_not_exported() {
-    let good = model(1e-4);
+    let model = model(1e-12);
     for language in [Language::C, Language::Glsl, Language::Hlsl, Language::Wgsl] {
-        assert!(source(&good, language, "m").is_ok());
-        let error = source(&model(1e-14), language, "m").unwrap_err();
+        // A quarter of the held-out error is the limit.
+        assert!(source(&with_held_out(&model, 4.1), language, "m").is_ok());
+        let error = source(&with_held_out(&model, 3.9), language, "m").unwrap_err();
         assert!(
             matches!(
                 error,
