@@ -1,6 +1,6 @@
 //! What people who measure bring to the program, as they run it.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod support;
 

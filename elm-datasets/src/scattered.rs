@@ -444,14 +444,16 @@ fn parse(
     Ok(Parsed { samples, notes })
 }
 
-/// The rows above the surface with their samples, and what was assumed; in an error the row, if it
-/// is one's.
+/// The rows above the surface, their samples, and what was assumed.
+type Reflected = (Vec<usize>, Samples, Vec<Note>);
+
+/// What lies above the surface; in an error the row, if it is one's.
 fn reflected(
     table: &Table,
     plan: &Plan,
     options: &Options,
     choice: &Columns,
-) -> Result<(Vec<usize>, Samples, Vec<Note>), (Option<usize>, Problem)> {
+) -> Result<Reflected, (Option<usize>, Problem)> {
     let mut reader = Reader::new(options.unit);
     let (mut rows, mut pairs) = (Vec::new(), Vec::new());
     let (mut below, mut transmitted) = (None, 0);
