@@ -4,8 +4,8 @@
 //! Both forms name what they hold, the version of the layout, and the scalar type, and are
 //! checked against all three before their contents are believed; the binary form also carries its
 //! length and a CRC-32. A damaged, truncated, foreign or future file is an [`Error`], never a
-//! panic, and no length in a file is trusted with an allocation. [`save`] writes beside the target
-//! and renames, so a file is whole or absent.
+//! panic, and no length in a file is trusted with an allocation. A file that [`save`]
+//! writes is whole or absent (see [`replace`]).
 //!
 //! ```
 //! use elm::{Elm, ElmParams, persist};
@@ -24,8 +24,10 @@
 //! length and bytes of the scalar type, `u64` length of the payload, `u32` CRC-32 (IEEE) of the
 //! payload, and the payload in the postcard encoding.
 
+mod whole;
+
 use std::fs;
-use std::io::{self, Read, Write};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
@@ -37,10 +39,14 @@ use crate::hidden::{Group, HiddenLayer};
 use crate::network::Elm;
 use crate::scalar::Scalar;
 
+pub use whole::replace;
+
 /// The version of the layout that this build writes and reads.
 pub const VERSION: u32 = 2;
 
 const MAGIC: &[u8; 8] = b"elmfile\n";
+/// The byte order mark of UTF-8.
+const MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Why a file was not written or not read.
 #[derive(Debug, thiserror::Error)]
@@ -280,13 +286,15 @@ pub fn to_bytes<T: Persist>(value: &T) -> Result<Vec<u8>, Error> {
     Ok(bytes)
 }
 
-/// Reads what [`to_bytes`] or [`to_json`] wrote.
+/// Reads what [`to_bytes`] or [`to_json`] wrote, JSON also with a byte order mark or white space before
+/// it, as editors leave it.
 ///
 /// # Errors
 /// Every variant of [`Error`] but [`Error::Io`], [`Error::File`] and [`Error::CustomActivation`].
 pub fn from_bytes<T: Persist>(bytes: &[u8]) -> Result<T, Error> {
-    match bytes {
-        [b'{', ..] => from_json(bytes),
+    let text = bytes.strip_prefix(MARK).unwrap_or(bytes);
+    match text.trim_ascii_start() {
+        [b'{', ..] => from_json(text),
         _ => from_binary(bytes),
     }
 }
@@ -428,21 +436,4 @@ impl<'a> Reader<'a> {
         array.copy_from_slice(self.take(N)?);
         Ok(array)
     }
-}
-
-/// Writes beside the file and renames.
-fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let dir = match path.parent() {
-        Some(dir) if !dir.as_os_str().is_empty() => dir,
-        _ => Path::new("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    // Temporary files are private to their owner; a model is as public as the user's umask says.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(dir)?;
-    file.write_all(bytes)?;
-    file.as_file().sync_all()?;
-    file.persist(path)?;
-    Ok(())
 }

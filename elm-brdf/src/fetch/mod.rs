@@ -12,7 +12,7 @@ mod links;
 
 use std::fmt::Write as _;
 use std::fs;
-use std::io::{self, Read, Write as _};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -205,7 +205,7 @@ pub fn curet(
     }
     for (description, bytes) in &fetched {
         let path = dir.join(description.file);
-        replace(dir, &path, bytes).map_err(|reason| Error::Write { path, reason })?;
+        put(dir, &path, bytes).map_err(|reason| Error::Write { path, reason })?;
     }
     Ok(fetched.into_iter().map(|(file, _)| file).collect())
 }
@@ -292,14 +292,8 @@ fn hexadecimal(bytes: &[u8]) -> String {
     })
 }
 
-/// Writes beside the file and renames, so that an interruption leaves the old one.
-fn replace(dir: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
+/// The whole file, in a folder that is made if it is not there.
+fn put(dir: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
     fs::create_dir_all(dir)?;
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(dir)?;
-    file.write_all(bytes)?;
-    file.persist(path)?;
-    Ok(())
+    elm::persist::replace(path, bytes)
 }

@@ -6,10 +6,10 @@ pub mod plot;
 mod tables;
 
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use elm::persist::replace;
 use elm_datasets::{MaterialId, Measurements, Origin, Samples};
 use serde::{Deserialize, Serialize};
 
@@ -402,22 +402,6 @@ fn json(report: &impl Serialize) -> Result<String> {
     })?;
     text.push('\n');
     Ok(text)
-}
-
-/// Writes beside the file and renames, so that an interruption leaves the old one.
-fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let dir = path.parent().unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(dir)?;
-    file.write_all(bytes)?;
-    // Temporary files are private to their owner; a report is not.
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        file.as_file()
-            .set_permissions(fs::Permissions::from_mode(0o644))?;
-    }
-    file.persist(path)?;
-    Ok(())
 }
 
 fn paper(id: MaterialId, channel: &str, measured: bool) -> Option<Paper> {

@@ -1,10 +1,9 @@
 //! Drawing the random layer from a seed.
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, s};
-use ndarray_rand::RandomExt;
-use ndarray_rand::rand_distr::{StandardNormal, StandardUniform};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{StandardNormal, StandardUniform};
 use serde::{Deserialize, Serialize};
 
 use super::{Group, HiddenLayer};
@@ -235,13 +234,10 @@ impl<A: Scalar> Plan<A> {
             _ => 0,
         };
         let shape = (group.count, inputs + 1 + more);
-        let mut draws: Array2<f64> = match self.distribution {
-            Distribution::Uniform => Array2::random_using(shape, StandardUniform, &mut random)
-                .mapv_into(|unit: f64| 2.0 * unit - 1.0),
-            Distribution::Normal | Distribution::StudentT(_) => {
-                Array2::random_using(shape, StandardNormal, &mut random)
-            }
-        };
+        let mut draws = Array2::from_shape_simple_fn(shape, || match self.distribution {
+            Distribution::Uniform => 2.0 * random.sample::<f64, _>(StandardUniform) - 1.0,
+            Distribution::Normal | Distribution::StudentT(_) => random.sample(StandardNormal),
+        });
         if more > 0 {
             for mut row in draws.rows_mut() {
                 let squares: f64 = row.iter().skip(inputs + 1).map(|z| z * z).sum();
