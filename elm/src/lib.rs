@@ -56,6 +56,7 @@ mod linalg;
 pub mod metrics;
 mod model;
 mod network;
+mod numbers;
 pub mod persist;
 mod predictor;
 pub mod prune;

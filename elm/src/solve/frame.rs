@@ -48,6 +48,23 @@ impl<A: Scalar> Frame<A> {
         }
     }
 
+    /// In another type.
+    pub(crate) fn narrow<B: Scalar>(self) -> Frame<B> {
+        let value = |value: A| B::from_f64(value.as_f64());
+        Frame {
+            rows: self.rows,
+            weighted_rows: self.weighted_rows,
+            intercept: self.intercept,
+            root_weights: self.root_weights.mapv_into_any(value),
+            weight_scale: value(self.weight_scale),
+            total_weight: value(self.total_weight),
+            hidden_mean: self.hidden_mean.mapv_into_any(value),
+            target_mean: self.target_mean.mapv_into_any(value),
+            hidden_scale: value(self.hidden_scale),
+            target_scale: self.target_scale.mapv_into_any(value),
+        }
+    }
+
     /// The unit vector that an intercept spans among the weighted rows,
     /// $\sqrt{w_i / \sum w}$; all 0 without one.
     pub(crate) fn constant_direction(&self) -> Array1<A> {

@@ -28,21 +28,26 @@ pub(crate) mod frame;
 mod gram;
 mod inverse;
 pub(crate) mod lanczos;
+mod leave_one_out;
 pub(crate) mod moments;
+mod named;
 mod pseudo_inverse;
 pub(crate) mod ridge;
 pub(crate) mod spectrum;
+#[cfg(test)]
+mod tests_tiles;
+mod tiles;
 
 use std::fmt;
 use std::str::FromStr;
 
 use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2, Axis};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::linalg::Failure;
 use crate::scalar::Scalar;
-use moments::RowSource;
+use moments::{HiddenRows, RowSource};
 use spectrum::Spectrum;
 
 pub use diagnosis::{Diagnosis, Reason, Route};
@@ -116,6 +121,16 @@ impl<'a, A: Scalar> LeastSquares<'a, A> {
 
     pub(crate) fn hidden(&self) -> ArrayView2<'a, A> {
         self.hidden
+    }
+
+    /// The problem as rows that could be made as they are needed.
+    fn row_source(&self) -> RowSource<'a, A> {
+        RowSource {
+            hidden: HiddenRows::Matrix(self.hidden),
+            targets: self.targets,
+            weights: self.weights,
+            intercept: self.intercept,
+        }
     }
 
     pub(crate) fn targets(&self) -> ArrayView2<'a, A> {
@@ -213,7 +228,7 @@ impl Solution<f64> {
 /// }
 /// # Ok::<(), elm::Error>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Solver {
@@ -267,9 +282,12 @@ impl Solver {
         source: &mut RowSource<'_, A>,
     ) -> Result<Option<Solution<A>>> {
         match self {
-            Self::Ridge(solver) => solver.solve_rows(source)?.map(in_range).transpose(),
-            Self::Inverse(_) | Self::PseudoInverse(_) => Ok(None),
+            Self::Ridge(solver) => solver.solve_rows(source)?,
+            Self::PseudoInverse(solver) => solver.solve_rows(source)?,
+            Self::Inverse(_) => None,
         }
+        .map(in_range)
+        .transpose()
     }
 
     /// Solves a problem that is known only by its spectrum.

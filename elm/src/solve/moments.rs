@@ -10,6 +10,7 @@ use std::ops::Range;
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, ShapeBuilder, s};
 
 use super::frame::{Frame, weighted_magnitudes};
+use super::tiles::magnitudes;
 use crate::error::Result;
 use crate::predictor::LayerRows;
 use crate::scalar::{Scalar, power_of_two};
@@ -49,8 +50,19 @@ impl<A: Scalar> HiddenRows<'_, A> {
         }
     }
 
+    /// As [`scale`](Self::scale), by weights in `f64`.
+    pub(super) fn scale_wide(&self, root_weights: &Array1<f64>) -> f64 {
+        match self {
+            Self::Layer(_) => 1.0,
+            Self::Matrix(matrix) => {
+                let largest = magnitudes(*matrix, root_weights);
+                power_of_two(largest.iter().fold(0.0, |m: f64, x| m.max(*x)))
+            }
+        }
+    }
+
     /// Writes rows divided by `scale`, less `shift`.
-    fn write(
+    pub(super) fn write(
         &mut self,
         rows: Range<usize>,
         scale: A,
@@ -97,12 +109,12 @@ impl<A: Scalar> RowSource<'_, A> {
         self.hidden.columns()
     }
 
-    fn outputs(&self) -> usize {
+    pub(super) fn outputs(&self) -> usize {
         self.targets.ncols()
     }
 
     /// Of a row of a tile: hidden values, targets, and a one where there is an intercept.
-    fn width(&self) -> usize {
+    pub(super) fn width(&self) -> usize {
         self.neurons() + self.outputs() + usize::from(self.intercept)
     }
 
@@ -219,7 +231,7 @@ impl<A: Scalar> Moments<A> {
         Ok(Self::of_sums(&sums, frame, shift))
     }
 
-    fn of_sums(sums: &Array2<A>, mut frame: Frame<A>, shift: Vec<A>) -> Self {
+    pub(super) fn of_sums(sums: &Array2<A>, mut frame: Frame<A>, shift: Vec<A>) -> Self {
         let (neurons, outputs) = (frame.hidden_mean.len(), frame.target_mean.len());
         let mut gram = Array2::zeros((neurons, neurons).f());
         gram.assign(&sums.slice(s![..neurons, ..neurons]));
@@ -321,7 +333,7 @@ impl<A: Scalar> Moments<A> {
 }
 
 /// Ranges of so many of more `rows`, up to a remainder, evenly spread from the first to the last.
-fn spread_runs(rows: usize, wanted: usize) -> impl Iterator<Item = Range<usize>> {
+pub(super) fn spread_runs(rows: usize, wanted: usize) -> impl Iterator<Item = Range<usize>> {
     let runs = RUNS.min(wanted);
     let length = wanted / runs;
     let last = rows - length;
@@ -334,7 +346,7 @@ fn spread_runs(rows: usize, wanted: usize) -> impl Iterator<Item = Range<usize>>
 /// A value near each column's weighted mean over a tile that has not been shifted; for a column that
 /// is constant there, its value to the last bit, so that what is left of it is 0. The last column,
 /// of ones, is left out.
-fn centre_of<A: Scalar>(tile: &[A], width: usize, roots: &Array1<A>) -> Vec<A> {
+pub(super) fn centre_of<A: Scalar>(tile: &[A], width: usize, roots: &Array1<A>) -> Vec<A> {
     let mut rows = tile
         .chunks_exact(width)
         .zip(roots)

@@ -5,7 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use super::frame::{Frame, Prepared};
 use super::lanczos::largest_eigenvalue;
+use super::moments::RowSource;
 use super::spectrum::{Spectrum, norm, rounding};
+use super::tiles::{self, Tiles};
 use super::{Diagnosis, LeastSquares, Reason, Route, Solution};
 use crate::error::{Error, Result};
 use crate::linalg::{Symmetric, Triangular};
@@ -34,7 +36,9 @@ use crate::scalar::Scalar;
 /// # Ok::<(), elm::Error>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct PseudoInverse {
+    #[serde(serialize_with = "crate::numbers::finite_if_any")]
     cutoff: Option<f64>,
 }
 
@@ -67,6 +71,9 @@ impl PseudoInverse {
     }
 
     pub(super) fn solve<A: Scalar>(self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
+        if let Some(solution) = self.solve_rows(&mut problem.row_source())? {
+            return Ok(solution);
+        }
         let prepared = Prepared::new(problem);
         let (hidden, targets) = (prepared.hidden.view(), prepared.targets.view());
         if hidden.nrows() < hidden.ncols() {
@@ -82,6 +89,37 @@ impl PseudoInverse {
             Spectrum::from_prepared(prepared)
         };
         Ok(self.solve_spectrum(&spectrum?))
+    }
+
+    /// The answer from rows that need not stand in memory together, where they are many more than
+    /// the neurons.
+    pub(super) fn solve_rows<A: Scalar>(
+        self,
+        source: &mut RowSource<'_, A>,
+    ) -> Result<Option<Solution<A>>> {
+        if !tiles::worthwhile(source.rows(), source.neurons()) {
+            return Ok(None);
+        }
+        let Some(mut tiles) = Tiles::new(source)? else {
+            return Ok(None);
+        };
+        let Some((triangle, frame)) = tiles.centred_triangle()? else {
+            return Ok(None);
+        };
+        self.solve_centred(triangle.narrow(), frame.narrow())
+            .map(Some)
+    }
+
+    /// The answer for a problem of many more rows than neurons that is reduced to its triangle.
+    pub(super) fn solve_centred<A: Scalar>(
+        self,
+        triangle: Triangular<A>,
+        frame: Frame<A>,
+    ) -> Result<Solution<A>> {
+        if let Some(solution) = self.solve_triangle(&triangle, &frame) {
+            return Ok(solution);
+        }
+        Ok(self.solve_spectrum(&Spectrum::of_triangle(triangle, frame)?))
     }
 
     pub(super) fn solve_spectrum<A: Scalar>(self, spectrum: &Spectrum<A>) -> Solution<A> {

@@ -1,12 +1,14 @@
 //! Regularised least squares: $\beta = \arg\min \lVert H\beta - T\rVert^2 + \lambda
 //! s_1^2 \lVert\beta\rVert^2$.
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip};
 use serde::{Deserialize, Serialize};
 
 use super::frame::Prepared;
-use super::moments::{HiddenRows, RowSource};
+use super::leave_one_out::{self, NEGLIGIBLE};
+use super::moments::RowSource;
 use super::spectrum::{RowSpectrum, Spectrum};
+use super::tiles::{self, Tiles};
 use super::{LeastSquares, Reason, Solution, gram};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
@@ -18,7 +20,7 @@ use crate::scalar::Scalar;
 #[serde(rename_all = "kebab-case")]
 pub enum Lambda {
     /// This value, positive and finite.
-    Relative(f64),
+    Relative(#[serde(serialize_with = "crate::numbers::finite")] f64),
     /// The value with the smallest exact leave-one-out error (Allen's PRESS, 1974), or the strongest
     /// whose squared error is within 1 % of that.
     #[default]
@@ -54,6 +56,7 @@ pub enum Lambda {
 /// # Ok::<(), elm::Error>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Ridge {
     lambda: Lambda,
     shared: bool,
@@ -131,17 +134,11 @@ impl Ridge {
     }
 
     pub(super) fn solve<A: Scalar>(self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
+        if let Some(solution) = self.solve_rows(&mut problem.row_source())? {
+            return Ok(solution);
+        }
         match self.lambda {
             Lambda::Relative(lambda) => {
-                let mut source = RowSource {
-                    hidden: HiddenRows::Matrix(problem.hidden),
-                    targets: problem.targets,
-                    weights: problem.weights,
-                    intercept: problem.intercept,
-                };
-                if let Some(solution) = self.solve_rows(&mut source)? {
-                    return Ok(solution);
-                }
                 let prepared = Prepared::new(problem);
                 if gram::allowed::<A>(lambda)
                     && let Some(solution) = gram::solve(&prepared, lambda)
@@ -165,22 +162,63 @@ impl Ridge {
         }
     }
 
-    /// The answer where a given strength allows the normal equations and there are at least as
-    /// many rows as neurons.
+    /// The answer from rows that need not stand in memory together: where a given strength allows
+    /// the normal equations and there are at least as many rows as neurons, and wherever there are
+    /// many more rows than neurons.
     pub(super) fn solve_rows<A: Scalar>(
         self,
         source: &mut RowSource<'_, A>,
     ) -> Result<Option<Solution<A>>> {
+        if let Lambda::Relative(lambda) = self.lambda
+            && gram::allowed::<A>(lambda)
+            && let Some(solution) = gram::solve_rows(source, lambda)?
+        {
+            return Ok(Some(solution));
+        }
+        if !tiles::worthwhile(source.rows(), source.neurons()) {
+            return Ok(None);
+        }
+        let Some(mut tiles) = Tiles::new(source)? else {
+            return Ok(None);
+        };
         match self.lambda {
-            Lambda::Relative(lambda) if gram::allowed::<A>(lambda) => {
-                gram::solve_rows(source, lambda)
+            Lambda::Relative(_) => {
+                let Some((triangle, frame)) = tiles.centred_triangle()? else {
+                    return Ok(None);
+                };
+                let spectrum = Spectrum::<A>::of_triangle(triangle.narrow(), frame.narrow())?;
+                Ok(Some(self.solve_spectrum(&spectrum)))
             }
-            _ => Ok(None),
+            Lambda::Gcv | Lambda::LeaveOneOut => {
+                let solution = self.search_tiles(&mut tiles, unit_roundoff::<A>())?;
+                Ok(solution.map(Solution::narrow))
+            }
         }
     }
 
+    /// As [`search`](Self::search), for many rows; nothing where their numbers are out of range.
+    pub(super) fn search_tiles<A: Scalar>(
+        self,
+        tiles: &mut Tiles<'_, '_, A>,
+        roundoff: f64,
+    ) -> Result<Option<Solution<f64>>> {
+        let Some(mut spectrum) = tiles.spectrum()? else {
+            return Ok(None);
+        };
+        let reason = Reason::StrengthSearch;
+        if self.lambda == Lambda::Gcv {
+            let lambda = self.by_gcv(&spectrum, roundoff);
+            return Ok(Some(answer(&spectrum, reason, &lambda, None)));
+        }
+        let candidates = distinct(&spectrum);
+        let scores =
+            leave_one_out::scores_of_tiles(tiles, &mut spectrum, &candidates, roundoff)?;
+        let (lambda, errors) = self.strengths_and_errors(&spectrum, &candidates, &scores);
+        Ok(Some(answer(&spectrum, reason, &lambda, Some(errors))))
+    }
+
     /// The answer by the best strength for predictions in arithmetic of this unit roundoff.
-    fn search(self, problem: &LeastSquares<'_, f64>, roundoff: f64) -> Result<Solution<f64>> {
+    pub(super) fn search(self, problem: &LeastSquares<'_, f64>, roundoff: f64) -> Result<Solution<f64>> {
         let reason = Reason::StrengthSearch;
         if self.lambda == Lambda::Gcv {
             let spectrum = Spectrum::new(problem)?;
@@ -246,12 +284,22 @@ impl Ridge {
         roundoff: f64,
     ) -> (Vec<f64>, Vec<f64>) {
         let candidates = distinct(&rows.spectrum);
-        let scores = leave_one_out_scores(rows, &candidates, roundoff);
-        let total = rows.spectrum.total_weight();
-        let chosen = self.choose(&rows.spectrum, &scores);
+        let scores = leave_one_out::scores(rows, &candidates, roundoff);
+        self.strengths_and_errors(&rows.spectrum, &candidates, &scores)
+    }
+
+    /// The best candidate of each output, and the root of its mean score.
+    fn strengths_and_errors<A: Scalar>(
+        self,
+        spectrum: &Spectrum<A>,
+        candidates: &[f64],
+        scores: &Array2<f64>,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let total = spectrum.total_weight();
+        let chosen = self.choose(spectrum, scores);
         chosen
             .iter()
-            .zip(rows.spectrum.target_scale())
+            .zip(spectrum.target_scale())
             .enumerate()
             .map(|(output, (&i, scale))| {
                 let error = (scores[[i, output]] / total).sqrt() * scale.as_f64();
@@ -365,60 +413,6 @@ fn gcv_scores<A: Scalar>(spectrum: &Spectrum<A>, candidates: &[f64], roundoff: f
         let rounding = spectrum.rounding_squares(&kept, roundoff, |o| NEGLIGIBLE * row[o]);
         for (score, rounding) in row.iter_mut().zip(rounding) {
             *score = (*score + rounding) / (spare * spare);
-        }
-    }
-    scores
-}
-
-/// The share of a score that rounding errors must have for them to be looked at closely.
-const NEGLIGIBLE: f64 = 1e-6;
-
-/// Rows whose leave-one-out residuals are computed together, for all candidates.
-const SCORED_ROWS: usize = 256;
-
-/// The sum of squared leave-one-out residuals, and of what rounding is to add to them, for each
-/// candidate and output, shape (candidates, outputs), in units of the scaled targets.
-///
-/// Rows pass by once, a block of them for all candidates: products of matrices, where a candidate
-/// by itself would read all rows for a product with a vector.
-fn leave_one_out_scores<A: Scalar>(
-    rows: &RowSpectrum<A>,
-    candidates: &[f64],
-    roundoff: f64,
-) -> Array2<f64> {
-    let spectrum = &rows.spectrum;
-    let mut scores = Array2::zeros((candidates.len(), spectrum.c.ncols()));
-    // Shape (directions, candidates).
-    let mut held_back = Array2::zeros((spectrum.s.len(), candidates.len()));
-    for (mut column, &lambda) in held_back.columns_mut().into_iter().zip(candidates) {
-        column.assign(&spectrum.ridge_held_back(A::from_f64(lambda)));
-    }
-    for first in (0..rows.u.nrows()).step_by(SCORED_ROWS) {
-        let block = s![first..rows.u.nrows().min(first + SCORED_ROWS), ..];
-        let u = rows.u.slice(block);
-        let squared = u.mapv(|u| u * u);
-        let mut denominators = A::product(squared.view(), held_back.view());
-        let free = rows.free.slice(s![first..first + u.nrows()]);
-        denominators += &free.insert_axis(Axis(1));
-        let residual = rows.residual.slice(block);
-        for (output, mut score) in scores.columns_mut().into_iter().enumerate() {
-            let held = &held_back * &spectrum.c.slice(s![.., output..=output]);
-            let mut residuals = A::product(u, held.view());
-            residuals += &residual.slice(s![.., output..=output]);
-            residuals /= &denominators;
-            for row in residuals.rows() {
-                Zip::from(&mut score)
-                    .and(row)
-                    .for_each(|score, e| *score += e.as_f64().powi(2));
-            }
-        }
-    }
-    for (mut score, &lambda) in scores.rows_mut().into_iter().zip(candidates) {
-        let kept = spectrum.ridge_kept(A::from_f64(lambda));
-        let negligible = |o: usize| NEGLIGIBLE * score[o];
-        let rounding = spectrum.rounding_squares(&kept, roundoff, negligible);
-        for (score, rounding) in score.iter_mut().zip(rounding) {
-            *score += rounding;
         }
     }
     scores

@@ -267,11 +267,7 @@ impl<A: Scalar> RowSpectrum<A> {
             targets,
             frame,
         } = Prepared::new(problem);
-        let lengths = frame.lengths(hidden.view());
-        let Svd { u, s, vt } = truncate(A::svd(hidden.view())?, frame.weighted_rows);
-        let c = A::product(u.t(), targets.view());
         let constant = frame.constant_direction();
-        let spanned = frame.spanned_by(u.ncols());
         // A row of weight 0 has no residual, which must not be divided by 0.
         let absent = |root: A| {
             if root > A::zero() {
@@ -280,8 +276,26 @@ impl<A: Scalar> RowSpectrum<A> {
                 A::one()
             }
         };
+        let absent = frame.root_weights.mapv(absent);
+        Self::of_rows(hidden, targets, constant, absent, frame)
+    }
+
+    /// Of rows that are weighted and centred, with the unit vector of the intercept among them (0
+    /// without one) and a 1 for those that are absent. There may be fewer than the frame's, which
+    /// others stand for.
+    pub(crate) fn of_rows(
+        hidden: Array2<A>,
+        targets: Array2<A>,
+        constant: Array1<A>,
+        absent: Array1<A>,
+        frame: Frame<A>,
+    ) -> Result<Self> {
+        let lengths = frame.lengths(hidden.view());
+        let Svd { u, s, vt } = truncate(A::svd(hidden.view())?, frame.weighted_rows);
+        let c = A::product(u.t(), targets.view());
+        let spanned = frame.spanned_by(u.ncols());
         let mut rows = Self {
-            free: frame.root_weights.mapv(absent),
+            free: absent,
             residual: Array2::zeros(targets.dim()),
             spectrum: Spectrum {
                 route: Route::Svd,

@@ -1,0 +1,467 @@
+//! Problems of many more rows than neurons, a tile of rows at a time: their triangle, and with it
+//! their singular vectors, without the hidden-layer matrix.
+//!
+//! Everything is `f64`, whatever the rows are: an ELM's directions fall far below the resolution of
+//! `f32`.
+
+use std::ops::Range;
+
+use ndarray::{Array1, Array2, ArrayView2, Axis, ShapeBuilder, s};
+
+use super::frame::Frame;
+use super::gram;
+use super::moments::{Moments, RowSource, centre_of, spread_runs};
+use super::spectrum::Spectrum;
+use super::Route;
+use crate::error::Result;
+use crate::linalg::{Kernel, Svd, Triangular};
+use crate::scalar::{Scalar, power_of_two};
+
+/// Rows for each column below which a problem is answered from its matrix, which costs no second
+/// look at the rows, and is factorised as accurately as it can be.
+const ROWS_PER_COLUMN: usize = 16;
+/// Entries of a hidden-layer matrix that is small enough to be there.
+const SMALL: usize = 1 << 22;
+
+/// Whether a problem of this shape is answered a tile at a time.
+pub(super) fn worthwhile(rows: usize, columns: usize) -> bool {
+    rows.saturating_mul(columns) >= SMALL && has_many_rows(rows, columns)
+}
+
+fn has_many_rows(rows: usize, columns: usize) -> bool {
+    rows / ROWS_PER_COLUMN >= columns
+}
+
+/// Rows of a sample, in units of the columns: enough to see what the condition is about.
+const SAMPLE: usize = 4;
+/// Rows below which a sample's means are not yet near those of all rows.
+const LEAST_SAMPLE: usize = 256;
+/// Rows that enter the triangle together, in units of the columns: what is factorised again with
+/// every block is a small part of it.
+const BLOCK: usize = 6;
+/// Bytes in a tile of rows, which should stay in the cache.
+const TILE_BYTES: usize = 1 << 20;
+
+/// The rows of a problem in `f64`: weighted, divided by powers of two, and less a shift.
+pub(super) struct Tiles<'s, 'a, A: Scalar> {
+    source: &'s mut RowSource<'a, A>,
+    /// Without means until they are known.
+    pub(super) frame: Frame<f64>,
+    /// Of hidden values and targets, in units of their scale: near the means, for a column that is
+    /// constant its value. 0 without an intercept.
+    shift: Vec<f64>,
+    narrow: Vec<A>,
+    wide: Array2<f64>,
+}
+
+impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
+    /// Nothing where too few rows have a weight.
+    ///
+    /// # Errors
+    /// Those of making the rows.
+    pub(super) fn new(source: &'s mut RowSource<'a, A>) -> Result<Option<Self>> {
+        let weights = source.weights.map(A::widen);
+        let weights = weights.as_ref().map(|weights| weights.view());
+        let mut frame = Frame::of_weights(source.rows(), weights.as_ref(), source.intercept);
+        if !has_many_rows(frame.weighted_rows, source.neurons()) {
+            return Ok(None);
+        }
+        frame.hidden_scale = source.hidden.scale_wide(&frame.root_weights);
+        frame.target_scale =
+            magnitudes(source.targets, &frame.root_weights).mapv_into(power_of_two);
+        frame.hidden_mean = Array1::zeros(source.neurons());
+        frame.target_mean = Array1::zeros(source.outputs());
+        let shift = vec![0.0; source.neurons() + source.outputs()];
+        Ok(Some(Self {
+            source,
+            frame,
+            shift,
+            narrow: Vec::new(),
+            wide: Array2::zeros((0, 0)),
+        }))
+    }
+
+    fn rows(&self) -> usize {
+        self.frame.rows
+    }
+
+    pub(super) fn neurons(&self) -> usize {
+        self.source.neurons()
+    }
+
+    pub(super) fn outputs(&self) -> usize {
+        self.source.outputs()
+    }
+
+    /// Ranges of rows, from the first to the last, each of a tile.
+    pub(super) fn ranges(&self) -> impl Iterator<Item = Range<usize>> + use<A> {
+        let rows = self.rows();
+        let step = (TILE_BYTES / size_of::<f64>() / self.source.width()).clamp(64, 1024);
+        (0..rows)
+            .step_by(step)
+            .map(move |first| first..rows.min(first + step))
+    }
+
+    /// Whether any of these rows has a weight.
+    fn is_empty(&self, rows: Range<usize>) -> bool {
+        let roots = self.frame.root_weights.slice(s![rows]);
+        roots.iter().all(|root| *root == 0.0)
+    }
+
+    /// These rows: hidden values and targets, and a one where there is an intercept, less `shift`,
+    /// times the root of the row's weight. A row of weight 0 is 0, whatever is in it.
+    ///
+    /// # Errors
+    /// Those of making the rows.
+    pub(super) fn tile(
+        &mut self,
+        rows: Range<usize>,
+        shift: &[f64],
+    ) -> Result<ArrayView2<'_, f64>> {
+        let (neurons, width) = (self.neurons(), self.source.width());
+        self.narrow.resize(rows.len() * neurons, A::zero());
+        if self.wide.nrows() < rows.len() {
+            self.wide = Array2::zeros((rows.len(), width));
+        }
+        let none = vec![A::zero(); neurons];
+        let scale = A::from_f64(self.frame.hidden_scale);
+        self.source
+            .hidden
+            .write(rows.clone(), scale, &none, &mut self.narrow, neurons)?;
+        let (hidden_shift, target_shift) = shift.split_at(neurons);
+        let targets = self.source.targets.slice(s![rows.clone(), ..]);
+        let roots = self.frame.root_weights.slice(s![rows.clone()]);
+        let wide = self.wide.as_slice_mut().unwrap_or(&mut []);
+        let lines = wide.chunks_exact_mut(width);
+        let values = self.narrow.chunks_exact(neurons).zip(targets.rows());
+        for ((to, (hidden, targets)), &root) in lines.zip(values).zip(roots) {
+            if root == 0.0 {
+                to.fill(0.0);
+                continue;
+            }
+            for ((to, value), shift) in to.iter_mut().zip(hidden).zip(hidden_shift) {
+                *to = value.as_f64() - shift;
+            }
+            let rest = &mut to[neurons..];
+            for (((to, target), &scale), shift) in rest
+                .iter_mut()
+                .zip(targets)
+                .zip(&self.frame.target_scale)
+                .zip(target_shift)
+            {
+                *to = target.as_f64() / scale - shift;
+            }
+            if self.frame.intercept {
+                to[width - 1] = 1.0;
+            }
+            if root != 1.0 {
+                to.iter_mut().for_each(|value| *value *= root);
+            }
+        }
+        Ok(self.wide.slice(s![..rows.len(), ..]))
+    }
+
+    /// Looks at rows from everywhere: sets the shift, and says whether the sums of products may do.
+    ///
+    /// # Errors
+    /// Those of making the rows.
+    fn look(&mut self) -> Result<bool> {
+        let width = self.source.width();
+        let wanted = (SAMPLE * width).max(LEAST_SAMPLE).min(self.rows());
+        let mut sample = Vec::with_capacity(wanted * width);
+        let mut roots = Vec::with_capacity(wanted);
+        let zeros = vec![0.0; self.shift.len()];
+        for run in spread_runs(self.rows(), wanted) {
+            roots.extend(self.frame.root_weights.slice(s![run.clone()]));
+            sample.extend(self.tile(run, &zeros)?);
+        }
+        let roots = Array1::from(roots);
+        if self.frame.intercept {
+            self.shift = centre_of(&sample, width, &roots);
+            for (row, root) in sample.chunks_exact_mut(width).zip(&roots) {
+                for (value, shift) in row.iter_mut().zip(&self.shift) {
+                    *value -= shift * root;
+                }
+            }
+        }
+        let neurons = self.neurons();
+        let Ok(sample) = ArrayView2::from_shape((sample.len() / width, width), &sample) else {
+            return Ok(false);
+        };
+        if sample.nrows() < neurons || !sample.iter().all(|value| value.is_finite()) {
+            return Ok(false);
+        }
+        let hidden = sample.slice(s![.., ..neurons]);
+        let nothing = Array2::zeros((sample.nrows(), 0));
+        let Triangular { r, .. } = f64::triangularise(hidden, nothing.view())?;
+        // Pivots bound the smallest singular value from above, columns the largest from below.
+        let smallest = r.diag().fold(f64::INFINITY, |m: f64, v| m.min(v.abs()));
+        let largest = squares(r.view()).fold(0.0, |m: f64, v| m.max(*v)).sqrt();
+        Ok(gram::allowed::<f64>((smallest / largest).powi(2)))
+    }
+
+    /// The problem in the coordinates of its singular vectors, or nothing where the numbers are out
+    /// of range. From sums of products where their condition allows it, else from the triangle.
+    ///
+    /// # Errors
+    /// Those of making the rows and of the factorisations.
+    pub(super) fn spectrum(&mut self) -> Result<Option<Spectrum<f64>>> {
+        if self.look()?
+            && let Some(spectrum) = self.spectrum_of_products()?
+        {
+            return Ok(Some(spectrum));
+        }
+        let Some((triangle, frame)) = self.triangle()? else {
+            return Ok(None);
+        };
+        Spectrum::of_triangle(triangle, frame).map(Some)
+    }
+
+    /// The triangle of the problem, and the frame with its means; or nothing where the numbers are
+    /// out of range.
+    ///
+    /// # Errors
+    /// Those of making the rows and of the factorisation.
+    pub(super) fn centred_triangle(&mut self) -> Result<Option<(Triangular<f64>, Frame<f64>)>> {
+        self.look()?;
+        self.triangle()
+    }
+
+    /// By the singular values of the sums of products, where those are well enough conditioned and
+    /// the targets not explained down to where sums of squares have no digits.
+    fn spectrum_of_products(&mut self) -> Result<Option<Spectrum<f64>>> {
+        /// The least share of the targets' squares that must be left.
+        const UNEXPLAINED: f64 = 1e-6;
+        let width = self.source.width();
+        let mut sums = Array2::zeros((width, width).f());
+        let mut scratch = Vec::new();
+        let shift = std::mem::take(&mut self.shift);
+        for range in self.ranges() {
+            if !self.is_empty(range.clone()) {
+                f64::add_gram(self.tile(range, &shift)?, &mut sums, &mut scratch);
+            }
+        }
+        let moments = Moments::of_sums(&sums, self.frame.clone(), shift.clone());
+        self.shift = shift;
+        if !moments.in_range() {
+            return Ok(None);
+        }
+        let lower = &moments.gram;
+        let gram = Array2::from_shape_fn(lower.dim(), |(i, j)| lower[[i.max(j), i.min(j)]]);
+        let Svd { s, vt, .. } = f64::svd(gram.view())?;
+        let (Some(&largest), Some(&smallest)) = (s.first(), s.last()) else {
+            return Ok(None);
+        };
+        // With the correction c errors are as if the condition were (1 + c / s_1^2) times as large.
+        let condition = largest / smallest * (1.0 + moments.correction / largest);
+        if !gram::allowed::<f64>(condition.recip()) {
+            return Ok(None);
+        }
+        let s = s.mapv_into(f64::sqrt);
+        let c = f64::product(vt.view(), moments.right.view()) / &s.view().insert_axis(Axis(1));
+        let unreached = &moments.squares - &squares(c.view());
+        let explained = |(&left, &all): (&f64, &f64)| all > 0.0 && left < UNEXPLAINED * all;
+        if unreached.iter().zip(&moments.squares).any(explained) {
+            return Ok(None);
+        }
+        let frame = moments.frame;
+        let mean = &frame.hidden_mean / frame.hidden_scale;
+        let lengths = &gram.diag() + &mean.mapv_into(|m| m * m * frame.total_weight);
+        Ok(Some(Spectrum {
+            route: Route::GramSvd,
+            s,
+            vt,
+            c,
+            unreached,
+            lengths,
+            frame,
+        }))
+    }
+
+    /// The triangle of the ones, where there is an intercept, and the hidden values of all rows but
+    /// these, less `shift`.
+    ///
+    /// # Errors
+    /// Those of making the rows and of the factorisation.
+    pub(super) fn triangle_without(
+        &mut self,
+        left_out: &[usize],
+        shift: &[f64],
+    ) -> Result<Triangular<f64>> {
+        let roots = self.frame.root_weights.select(Axis(0), left_out);
+        for &row in left_out {
+            self.frame.root_weights[row] = 0.0;
+        }
+        let triangle = self.stacked(shift);
+        for (&row, root) in left_out.iter().zip(roots) {
+            self.frame.root_weights[row] = root;
+        }
+        triangle
+    }
+
+    /// The triangle of the centred rows, and their means.
+    fn triangle(&mut self) -> Result<Option<(Triangular<f64>, Frame<f64>)>> {
+        let shift = std::mem::take(&mut self.shift);
+        let all = self.stacked(&shift)?;
+        let triangle = self.centred(all, &shift);
+        self.shift = shift;
+        Ok(triangle)
+    }
+
+    /// The triangle of the rows, block after block (sequential TSQR: Demmel, Grigori, Hoemmen and
+    /// Langou, Communication-optimal parallel and sequential QR, 2012). Eliminating the column of
+    /// ones first centres the rest.
+    fn stacked(&mut self, shift: &[f64]) -> Result<Triangular<f64>> {
+        let (neurons, outputs) = (self.neurons(), self.outputs());
+        let columns = usize::from(self.frame.intercept) + neurons;
+        let mut stack = Stack::new(columns, outputs, BLOCK * columns);
+        for range in self.ranges() {
+            if self.is_empty(range.clone()) {
+                continue;
+            }
+            let tile = self.tile(range, shift)?;
+            let (hidden, rest) = tile.split_at(Axis(1), neurons);
+            let (targets, ones) = rest.split_at(Axis(1), outputs);
+            stack.push(ones, hidden, targets)?;
+        }
+        stack.finish()
+    }
+
+    /// Without the column of ones, the means taken from its row.
+    fn centred(
+        &self,
+        all: Triangular<f64>,
+        shift: &[f64],
+    ) -> Option<(Triangular<f64>, Frame<f64>)> {
+        let Triangular {
+            mut r,
+            mut qtb,
+            mut unreached,
+        } = all;
+        let mut frame = self.frame.clone();
+        if frame.intercept {
+            let neurons = self.neurons();
+            let (hidden_shift, target_shift) = shift.split_at(neurons);
+            let ones = r[[0, 0]];
+            let hidden_mean = &r.slice(s![0, 1..]) / ones + &Array1::from(hidden_shift.to_vec());
+            let target_mean = &qtb.row(0) / ones + &Array1::from(target_shift.to_vec());
+            r = r.slice(s![1.., 1..]).to_owned();
+            qtb = qtb.slice(s![1.., ..]).to_owned();
+            // What centring leaves of a constant is rounding, and would pass for a feature.
+            let constant = |left: f64, mean: f64| {
+                left.sqrt() <= 4.0 * f64::EPSILON * mean.abs() * frame.total_weight.sqrt()
+            };
+            let left = squares(r.view());
+            for ((mut column, &left), &mean) in
+                r.columns_mut().into_iter().zip(&left).zip(&hidden_mean)
+            {
+                if constant(left, mean) {
+                    column.fill(0.0);
+                }
+            }
+            let left = squares(qtb.view()) + &unreached;
+            for (output, mut column) in qtb.columns_mut().into_iter().enumerate() {
+                if constant(left[output], target_mean[output]) {
+                    column.fill(0.0);
+                    unreached[output] = 0.0;
+                }
+            }
+            frame.hidden_mean = hidden_mean * frame.hidden_scale;
+            frame.target_mean = target_mean * &frame.target_scale;
+        }
+        let largest = squares(r.view()).fold(0.0, |m: f64, v| m.max(*v));
+        let bound = f64::MAX.sqrt();
+        let in_range = largest == 0.0 || (bound.recip()..bound).contains(&largest);
+        let finite = |values: &Array2<f64>| values.iter().all(|value| value.is_finite());
+        let finite = finite(&r) && finite(&qtb) && unreached.iter().all(|value| value.is_finite());
+        let triangle = Triangular { r, qtb, unreached };
+        (in_range && finite).then_some((triangle, frame))
+    }
+}
+
+/// A triangle on top of rows that are to enter it.
+struct Stack {
+    hidden: Array2<f64>,
+    targets: Array2<f64>,
+    unreached: Array1<f64>,
+    filled: usize,
+}
+
+impl Stack {
+    fn new(columns: usize, outputs: usize, block: usize) -> Self {
+        Self {
+            hidden: Array2::zeros((columns + block, columns).f()),
+            targets: Array2::zeros((columns + block, outputs).f()),
+            unreached: Array1::zeros(outputs),
+            filled: columns,
+        }
+    }
+
+    fn push(
+        &mut self,
+        ones: ArrayView2<'_, f64>,
+        hidden: ArrayView2<'_, f64>,
+        targets: ArrayView2<'_, f64>,
+    ) -> Result<()> {
+        let mut first = 0;
+        while first < hidden.nrows() {
+            let room = self.hidden.nrows() - self.filled;
+            let from = first..hidden.nrows().min(first + room);
+            let to = self.filled..self.filled + from.len();
+            let mut rows = self.hidden.slice_mut(s![to.clone(), ..]);
+            rows.slice_mut(s![.., ..ones.ncols()])
+                .assign(&ones.slice(s![from.clone(), ..]));
+            rows.slice_mut(s![.., ones.ncols()..])
+                .assign(&hidden.slice(s![from.clone(), ..]));
+            self.targets
+                .slice_mut(s![to.clone(), ..])
+                .assign(&targets.slice(s![from.clone(), ..]));
+            (first, self.filled) = (from.end, to.end);
+            if self.filled == self.hidden.nrows() {
+                self.factorise()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn factorise(&mut self) -> Result<()> {
+        let rows = s![..self.filled, ..];
+        let Triangular { r, qtb, unreached } =
+            f64::triangularise(self.hidden.slice(rows), self.targets.slice(rows))?;
+        self.filled = r.nrows();
+        let top = s![..self.filled, ..];
+        self.hidden.slice_mut(top).assign(&r);
+        self.targets.slice_mut(top).assign(&qtb);
+        self.unreached += &unreached;
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<Triangular<f64>> {
+        self.factorise()?;
+        let top = s![..self.filled, ..];
+        Ok(Triangular {
+            r: self.hidden.slice(top).to_owned(),
+            qtb: self.targets.slice(top).to_owned(),
+            unreached: self.unreached,
+        })
+    }
+}
+
+/// Sum of squares of each column.
+fn squares(matrix: ArrayView2<'_, f64>) -> Array1<f64> {
+    matrix.map_axis(Axis(0), |column| column.dot(&column))
+}
+
+/// For each column the largest $\sqrt{w_i} |a_{ij}|$, in `f64`.
+pub(super) fn magnitudes<A: Scalar>(
+    matrix: ArrayView2<'_, A>,
+    roots: &Array1<f64>,
+) -> Array1<f64> {
+    let mut largest = Array1::zeros(matrix.ncols());
+    for (row, root) in matrix.rows().into_iter().zip(roots) {
+        for (largest, value) in largest.iter_mut().zip(row) {
+            *largest = f64::max(*largest, root * value.as_f64().abs());
+        }
+    }
+    largest
+}
