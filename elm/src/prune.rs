@@ -79,7 +79,7 @@ pub enum Keep {
     /// As few neurons as keep the leave-one-out RMSE within 1 plus this times that of all: 0.05 for
     /// a loss of 5 %. Of several outputs, the root mean square of their RMSEs, each relative to the
     /// output's standard deviation.
-    Loss(f64),
+    Loss(#[serde(serialize_with = "crate::numbers::finite")] f64),
 }
 
 /// A size of network, and how good it is by leave-one-out at the strength that ranked the neurons.
@@ -89,6 +89,7 @@ pub struct Size {
     pub neurons: usize,
     /// Leave-one-out RMSE relative to the targets' standard deviation, root mean square over
     /// outputs; infinite where a row determines its own fit.
+    #[serde(with = "crate::numbers::score")]
     pub score: f64,
 }
 

@@ -274,7 +274,14 @@ impl<A: Scalar> FromStr for Activation<A> {
 }
 
 impl<A: Scalar> Serialize for Activation<A> {
+    /// By name; a custom function is code, which no file holds, and might have the name of another.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if let Self::Custom(custom) = self {
+            return Err(serde::ser::Error::custom(format_args!(
+                "the activation '{}' is custom and cannot be written to a file",
+                custom.name
+            )));
+        }
         serializer.serialize_str(self.name())
     }
 }

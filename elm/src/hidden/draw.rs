@@ -49,7 +49,7 @@ pub enum Biases {
     #[default]
     AsWeights,
     /// Drawn as the weights are, and multiplied by a scale of their own.
-    Scaled(f64),
+    Scaled(#[serde(serialize_with = "crate::numbers::finite")] f64),
     /// Chosen so that each neuron's weighted sum is 0 at a training row drawn for it: the bend or
     /// bump of every neuron then lies where there are data, whatever the scale of the weights. Rows
     /// that have weights of their own are drawn in proportion to them.
@@ -88,13 +88,22 @@ pub enum Kind {
 /// # Ok::<(), elm::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[serde(bound = "", deny_unknown_fields)]
 pub struct Neurons<A: Scalar> {
     pub(crate) count: usize,
+    #[serde(default)]
     pub(crate) activation: Activation<A>,
+    #[serde(default)]
     pub(crate) kind: Kind,
+    #[serde(default = "one", serialize_with = "crate::numbers::finite")]
     pub(crate) scale: f64,
+    #[serde(default)]
     pub(crate) biases: Biases,
+}
+
+/// The scale of a file that does not say.
+fn one() -> f64 {
+    1.0
 }
 
 impl<A: Scalar> Neurons<A> {

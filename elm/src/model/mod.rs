@@ -2,9 +2,9 @@
 
 mod checked;
 mod rows;
+mod settings;
 
-use ndarray::{ArrayBase, ArrayRef2, ArrayView2, Axis, Data, Ix1, Ix2};
-use serde::{Deserialize, Serialize};
+use ndarray::{ArrayBase, ArrayRef1, ArrayRef2, ArrayView2, Axis, Data, Ix1, Ix2};
 
 use crate::activation::Activation;
 use crate::error::{Error, Result};
@@ -40,6 +40,20 @@ pub(crate) use rows::Rows;
 ///
 /// # Example
 ///
+/// In JSON and the like settings have these names too, and those that are missing their defaults:
+///
+/// ```
+/// use elm::{Activation, ElmParams};
+///
+/// let text = r#"{ "neurons": 20, "activation": "tanh", "solver": "pseudo-inverse" }"#;
+/// let params: ElmParams<f64> = serde_json::from_str(text)?;
+/// let same = ElmParams::new(20)
+///     .activation(Activation::Tanh)
+///     .solver(elm::solve::PseudoInverse::default());
+/// assert_eq!(params, same);
+/// # Ok::<(), serde_json::Error>(())
+/// ```
+///
 /// ```
 /// use elm::ElmParams;
 /// use ndarray::{Array1, Axis};
@@ -51,8 +65,7 @@ pub(crate) use rows::Rows;
 /// assert!(error < 1e-3);
 /// # Ok::<(), elm::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ElmParams<A: Scalar> {
     /// The neurons that the setters here describe.
     neurons: Neurons<A>,
@@ -296,6 +309,18 @@ impl<A: Scalar> ElmParams<A> {
 pub trait Targets<A: Scalar> {
     /// The targets with shape (rows, outputs).
     fn as_matrix(&self) -> ArrayView2<'_, A>;
+}
+
+impl<A: Scalar> Targets<A> for ArrayRef2<A> {
+    fn as_matrix(&self) -> ArrayView2<'_, A> {
+        self.view()
+    }
+}
+
+impl<A: Scalar> Targets<A> for ArrayRef1<A> {
+    fn as_matrix(&self) -> ArrayView2<'_, A> {
+        self.view().insert_axis(Axis(1))
+    }
 }
 
 impl<A: Scalar, S: Data<Elem = A>> Targets<A> for ArrayBase<S, Ix2> {

@@ -78,12 +78,14 @@ pub struct Trial {
     /// Number of hidden neurons.
     pub neurons: usize,
     /// Scale of the random weights.
+    #[serde(serialize_with = "crate::numbers::finite")]
     pub scale: f64,
     /// Scale of each input on top of it; empty where all are 1.
     pub input_scales: Vec<f64>,
     /// Whether inputs reach the outputs directly, too.
     pub direct_links: bool,
     /// Held-out RMSE relative to the targets' standard deviation, root mean square over outputs.
+    #[serde(with = "crate::numbers::score")]
     pub score: f64,
 }
 

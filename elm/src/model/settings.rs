@@ -1,0 +1,227 @@
+//! Settings as files: what [`ElmParams`] are in JSON and the like, and in binary.
+//!
+//! Where people read it every setting has the name of its setter, and one that is missing its default:
+//! `{"neurons": 20}` will do. Binary forms, which know no names, have all fields in order.
+
+use serde::de::{self, Deserializer, MapAccess, Visitor, value::MapAccessDeserializer};
+use serde::ser::{Error as _, Serializer};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::marker::PhantomData;
+
+use super::ElmParams;
+use crate::activation::Activation;
+use crate::error::Error;
+use crate::hidden::{Biases, Distribution, Kind, Neurons};
+use crate::scalar::Scalar;
+use crate::solve::Solver;
+
+/// In order, without names.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "", rename = "ElmParams")]
+struct Fields<A: Scalar> {
+    neurons: Neurons<A>,
+    others: Vec<Neurons<A>>,
+    distribution: Distribution,
+    scale: f64,
+    input_scales: Vec<f64>,
+    seed: u64,
+    solver: Solver,
+    intercept: Option<bool>,
+    standardise: bool,
+    direct_links: bool,
+}
+
+/// By the names of the setters.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "", rename = "ElmParams", deny_unknown_fields)]
+struct Named<A: Scalar> {
+    neurons: Count<A>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    activation: Option<Activation<A>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    kind: Option<Kind>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    biases: Option<Biases>,
+    #[serde(default, alias = "others", skip_serializing_if = "Vec::is_empty")]
+    and: Vec<Neurons<A>>,
+    #[serde(default)]
+    distribution: Distribution,
+    #[serde(default = "one")]
+    scale: f64,
+    #[serde(default)]
+    input_scales: Vec<f64>,
+    #[serde(default)]
+    seed: u64,
+    #[serde(default)]
+    solver: Solver,
+    #[serde(default)]
+    intercept: Option<bool>,
+    #[serde(default = "yes")]
+    standardise: bool,
+    #[serde(default)]
+    direct_links: bool,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// How many neurons; or, as files had it before there were names, all that there is to say of them.
+enum Count<A: Scalar> {
+    Number(usize),
+    Neurons(Neurons<A>),
+}
+
+impl<A: Scalar> Serialize for Count<A> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Number(count) => count.serialize(serializer),
+            Self::Neurons(neurons) => neurons.serialize(serializer),
+        }
+    }
+}
+
+impl<'de, A: Scalar> Deserialize<'de> for Count<A> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either<A>(PhantomData<A>);
+        impl<'de, A: Scalar> Visitor<'de> for Either<A> {
+            type Value = Count<A>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number of neurons")
+            }
+
+            fn visit_u64<E: de::Error>(self, count: u64) -> Result<Self::Value, E> {
+                let number = usize::try_from(count).map_err(E::custom)?;
+                Ok(Count::Number(number))
+            }
+
+            fn visit_i64<E: de::Error>(self, count: i64) -> Result<Self::Value, E> {
+                let number = usize::try_from(count).map_err(E::custom)?;
+                Ok(Count::Number(number))
+            }
+
+            fn visit_map<M: MapAccess<'de>>(self, map: M) -> Result<Self::Value, M::Error> {
+                let neurons = Neurons::deserialize(MapAccessDeserializer::new(map))?;
+                Ok(Count::Neurons(neurons))
+            }
+        }
+        deserializer.deserialize_any(Either(PhantomData))
+    }
+}
+
+impl<A: Scalar> Serialize for ElmParams<A> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        // JSON would make null of it, and nothing could be read from that.
+        if let Err(error @ Error::Parameter { value, .. }) = self.clone().check()
+            && !value.is_finite()
+        {
+            return Err(S::Error::custom(error));
+        }
+        let own = self.clone();
+        if !serializer.is_human_readable() {
+            return Fields::from(own).serialize(serializer);
+        }
+        let Self { neurons, .. } = own;
+        let plain = neurons.scale == 1.0;
+        let named = Named {
+            activation: plain.then(|| neurons.activation.clone()),
+            kind: plain.then_some(neurons.kind),
+            biases: plain.then_some(neurons.biases),
+            neurons: if plain {
+                Count::Number(neurons.count)
+            } else {
+                Count::Neurons(neurons)
+            },
+            and: own.others,
+            distribution: own.distribution,
+            scale: own.scale,
+            input_scales: own.input_scales,
+            seed: own.seed,
+            solver: own.solver,
+            intercept: own.intercept,
+            standardise: own.standardise,
+            direct_links: own.direct_links,
+        };
+        named.serialize(serializer)
+    }
+}
+
+impl<'de, A: Scalar> Deserialize<'de> for ElmParams<A> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        if deserializer.is_human_readable() {
+            Named::deserialize(deserializer).map(Self::from)
+        } else {
+            Fields::deserialize(deserializer).map(Self::from)
+        }
+    }
+}
+
+impl<A: Scalar> From<Named<A>> for ElmParams<A> {
+    fn from(named: Named<A>) -> Self {
+        let mut neurons = match named.neurons {
+            Count::Number(count) => Neurons::new(count, Activation::default()),
+            Count::Neurons(neurons) => neurons,
+        };
+        if let Some(activation) = named.activation {
+            neurons.activation = activation;
+        }
+        if let Some(kind) = named.kind {
+            neurons.kind = kind;
+        }
+        if let Some(biases) = named.biases {
+            neurons.biases = biases;
+        }
+        Self {
+            neurons,
+            others: named.and,
+            distribution: named.distribution,
+            scale: named.scale,
+            input_scales: named.input_scales,
+            seed: named.seed,
+            solver: named.solver,
+            intercept: named.intercept,
+            standardise: named.standardise,
+            direct_links: named.direct_links,
+        }
+    }
+}
+
+impl<A: Scalar> From<Fields<A>> for ElmParams<A> {
+    fn from(fields: Fields<A>) -> Self {
+        Self {
+            neurons: fields.neurons,
+            others: fields.others,
+            distribution: fields.distribution,
+            scale: fields.scale,
+            input_scales: fields.input_scales,
+            seed: fields.seed,
+            solver: fields.solver,
+            intercept: fields.intercept,
+            standardise: fields.standardise,
+            direct_links: fields.direct_links,
+        }
+    }
+}
+
+impl<A: Scalar> From<ElmParams<A>> for Fields<A> {
+    fn from(params: ElmParams<A>) -> Self {
+        Self {
+            neurons: params.neurons,
+            others: params.others,
+            distribution: params.distribution,
+            scale: params.scale,
+            input_scales: params.input_scales,
+            seed: params.seed,
+            solver: params.solver,
+            intercept: params.intercept,
+            standardise: params.standardise,
+            direct_links: params.direct_links,
+        }
+    }
+}
