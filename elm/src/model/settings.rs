@@ -30,6 +30,7 @@ struct Fields<A: Scalar> {
     intercept: Option<bool>,
     standardise: bool,
     direct_links: bool,
+    bounded: bool,
 }
 
 /// By the names of the setters.
@@ -61,6 +62,8 @@ struct Named<A: Scalar> {
     standardise: bool,
     #[serde(default)]
     direct_links: bool,
+    #[serde(default = "yes")]
+    bounded: bool,
 }
 
 fn one() -> f64 {
@@ -147,6 +150,7 @@ impl<A: Scalar> Serialize for ElmParams<A> {
             intercept: own.intercept,
             standardise: own.standardise,
             direct_links: own.direct_links,
+            bounded: own.bounded,
         };
         named.serialize(serializer)
     }
@@ -188,6 +192,7 @@ impl<A: Scalar> From<Named<A>> for ElmParams<A> {
             intercept: named.intercept,
             standardise: named.standardise,
             direct_links: named.direct_links,
+            bounded: named.bounded,
         }
     }
 }
@@ -205,6 +210,7 @@ impl<A: Scalar> From<Fields<A>> for ElmParams<A> {
             intercept: fields.intercept,
             standardise: fields.standardise,
             direct_links: fields.direct_links,
+            bounded: fields.bounded,
         }
     }
 }
@@ -222,6 +228,7 @@ impl<A: Scalar> From<ElmParams<A>> for Fields<A> {
             intercept: params.intercept,
             standardise: params.standardise,
             direct_links: params.direct_links,
+            bounded: params.bounded,
         }
     }
 }

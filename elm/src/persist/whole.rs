@@ -261,7 +261,12 @@ mod tests {
         let other = File::create(of(".a.txt.other.elm-tmp")).unwrap();
         other.lock().unwrap();
         replace(&path, b"whole").unwrap();
-        let left = [".a.txt.other.elm-tmp", ".b.txt.Xyz.elm-tmp", ".tmpXyz", "a.txt"];
+        let left = [
+            ".a.txt.other.elm-tmp",
+            ".b.txt.Xyz.elm-tmp",
+            ".tmpXyz",
+            "a.txt",
+        ];
         assert_eq!(names(folder.path()), left);
         drop(other);
         replace(&path, b"again").unwrap();

@@ -3,6 +3,7 @@
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
 
+use super::Route;
 use super::spectrum::{RowSpectrum, Spectrum};
 use super::tiles::Tiles;
 use crate::error::Result;
@@ -25,10 +26,12 @@ struct Scores<'p, A: Scalar> {
     held_back: Array2<A>,
     /// Shape (candidates, outputs), in units of the scaled targets.
     sums: Array2<f64>,
+    /// Whether only what leave-one-out adds to squared residuals is counted.
+    excess: bool,
 }
 
 impl<'p, A: Scalar> Scores<'p, A> {
-    fn new(spectrum: &'p Spectrum<A>, candidates: &[f64]) -> Self {
+    fn new(spectrum: &'p Spectrum<A>, candidates: &[f64], excess: bool) -> Self {
         let mut held_back = Array2::zeros((spectrum.s.len(), candidates.len()));
         for (mut column, &lambda) in held_back.columns_mut().into_iter().zip(candidates) {
             column.assign(&spectrum.ridge_held_back(A::from_f64(lambda)));
@@ -37,6 +40,7 @@ impl<'p, A: Scalar> Scores<'p, A> {
             spectrum,
             held_back,
             sums: Array2::zeros((candidates.len(), spectrum.c.ncols())),
+            excess,
         }
     }
 
@@ -50,6 +54,13 @@ impl<'p, A: Scalar> Scores<'p, A> {
             let held = &self.held_back * &c.slice(s![.., output..=output]);
             let mut residuals = A::product(u, held.view());
             residuals += &residual.slice(s![.., output..=output]);
+            if self.excess {
+                for row in residuals.rows() {
+                    Zip::from(&mut score)
+                        .and(row)
+                        .for_each(|score, e| *score -= e.as_f64().powi(2));
+                }
+            }
             residuals /= &denominators;
             for row in residuals.rows() {
                 Zip::from(&mut score)
@@ -81,7 +92,7 @@ pub(super) fn scores<A: Scalar>(
     candidates: &[f64],
     roundoff: f64,
 ) -> Array2<f64> {
-    let mut scores = Scores::new(&rows.spectrum, candidates);
+    let mut scores = Scores::new(&rows.spectrum, candidates, false);
     for first in (0..rows.u.nrows()).step_by(SCORED_ROWS) {
         let block = first..rows.u.nrows().min(first + SCORED_ROWS);
         scores.add(
@@ -93,67 +104,194 @@ pub(super) fn scores<A: Scalar>(
     scores.finish(candidates, roundoff)
 }
 
-/// As [`scores`], from one more pass over the rows of `spectrum`, whose [`unreached`] is set to the
-/// squares that the rows show.
+/// As [`scores`], from one more pass over the rows of `spectrum`.
 ///
-/// A row has the coordinates $u = \tilde h V / s$ in the singular vectors. Where it all but determines its
-/// own fit, $1 - \sum_j u_j^2$ has no digits left: there are no more such rows than neurons, and these are
+/// A row has the coordinates $u = \\tilde h V / s$ in the singular vectors. Where it all but determines its
+/// own fit, $1 - \\sum_j u_j^2$ has no digits left: there are no more such rows than neurons, and these are
 /// scored from a problem in which the triangle of the other rows stands for them.
 ///
 /// # Errors
 /// Those of making the rows and of the factorisations.
-///
-/// [`unreached`]: Spectrum::unreached
 pub(super) fn scores_of_tiles<A: Scalar>(
     tiles: &mut Tiles<'_, '_, A>,
-    spectrum: &mut Spectrum<f64>,
+    spectrum: &Spectrum<f64>,
     candidates: &[f64],
     roundoff: f64,
 ) -> Result<Array2<f64>> {
-    /// Freedom below which a difference from 1 is not relied on.
-    const CLOSE: f64 = 1e-4;
-    let neurons = tiles.neurons();
+    /// Condition up to which leverages may be computed in `f32`.
+    const MODERATE: f64 = 1e3;
     let mean = means(spectrum);
-    let to_u = &spectrum.vt.t() / &spectrum.s;
-    let total = spectrum.frame.total_weight;
-    let mut unreached = Array1::<f64>::zeros(tiles.outputs());
-    let mut scores = Scores::new(spectrum, candidates);
-    let mut close: Vec<usize> = Vec::new();
-    for range in tiles.ranges() {
-        let first = range.start;
-        let tile = tiles.tile(range, &mean)?;
-        let (hidden, rest) = tile.split_at(Axis(1), neurons);
+    let condition = match (spectrum.s.first(), spectrum.s.last()) {
+        (Some(first), Some(last)) => first / last,
+        _ => 1.0,
+    };
+    let single = spectrum.route == Route::GramSvd && condition <= MODERATE;
+    let mut pass = Pass {
+        to_u: &spectrum.vt.t() / &spectrum.s,
+        scores: Scores::new(spectrum, candidates, single),
+        close: Vec::new(),
+    };
+    if single {
+        let mut light = Light::new(spectrum, candidates);
+        for range in tiles.ranges() {
+            let first = range.start;
+            let tile = tiles.tile(range, &mean)?;
+            let heavy = light.add(tile);
+            if !heavy.is_empty() {
+                let rows: Vec<usize> = heavy.iter().map(|row| first + row).collect();
+                pass.add(tile.select(Axis(0), &heavy).view(), &rows);
+            }
+        }
+        pass.scores.sums += &light.sums;
+        pass.scores.sums += &squared_residuals(spectrum, candidates);
+    } else {
+        for range in tiles.ranges() {
+            let rows: Vec<usize> = range.clone().collect();
+            pass.add(tiles.tile(range, &mean)?, &rows);
+        }
+    }
+    if !pass.close.is_empty() {
+        let close = &pass.close;
+        pass.scores.sums +=
+            &scores_of_close_rows(tiles, spectrum, &mean, close, candidates, single)?;
+    }
+    Ok(pass.scores.finish(candidates, roundoff))
+}
+
+/// The squared residuals of each candidate and output, which the spectrum knows: the least that scores
+/// can be. Shape (candidates, outputs).
+pub(super) fn squared_residuals(spectrum: &Spectrum<f64>, candidates: &[f64]) -> Array2<f64> {
+    let mut sums = Array2::zeros((candidates.len(), spectrum.c.ncols()));
+    for (mut row, &lambda) in sums.rows_mut().into_iter().zip(candidates) {
+        let held = spectrum.ridge_held_back(lambda);
+        let left = (&spectrum.c * &held.insert_axis(Axis(1))).mapv_into(|c| c * c);
+        row.assign(&(left.sum_axis(Axis(0)) + &spectrum.unreached));
+    }
+    sums
+}
+
+/// A pass over rows in `f64`.
+struct Pass<'p> {
+    /// What takes a row to its coordinates in the left singular vectors.
+    to_u: Array2<f64>,
+    scores: Scores<'p, f64>,
+    /// Rows that all but determine their own fit.
+    close: Vec<usize>,
+}
+
+impl Pass<'_> {
+    /// Scores the rows of a tile, of these numbers, or notes that they are close.
+    fn add(&mut self, tile: ArrayView2<'_, f64>, rows: &[usize]) {
+        /// Freedom below which a difference from 1 is not relied on.
+        const CLOSE: f64 = 1e-4;
+        let spectrum = self.scores.spectrum;
+        let (hidden, rest) = tile.split_at(Axis(1), self.to_u.nrows());
         let (targets, ones) = rest.split_at(Axis(1), spectrum.c.ncols());
-        let u = f64::product(hidden, to_u.view());
+        let u = f64::product(hidden, self.to_u.view());
         let residual = &targets - &f64::product(u.view(), spectrum.c.view());
-        unreached += &residual.map_axis(Axis(0), |column| column.dot(&column));
         let mut free = u.map_axis(Axis(1), |row| 1.0 - row.dot(&row));
         if let Some(roots) = ones.columns().into_iter().next() {
+            let total = spectrum.frame.total_weight;
             Zip::from(&mut free)
                 .and(roots)
                 .for_each(|free, root| *free -= root * root / total);
         }
         if free.iter().all(|free| *free >= CLOSE) {
-            scores.add(u.view(), residual.view(), free.view());
-            continue;
+            self.scores.add(u.view(), residual.view(), free.view());
+            return;
         }
         let (far, near): (Vec<usize>, Vec<usize>) =
             (0..free.len()).partition(|&row| free[row] >= CLOSE);
-        scores.add(
+        self.scores.add(
             u.select(Axis(0), &far).view(),
             residual.select(Axis(0), &far).view(),
             free.select(Axis(0), &far).view(),
         );
-        close.extend(near.iter().map(|row| first + row));
+        self.close.extend(near.iter().map(|&row| rows[row]));
     }
-    let mut sums = scores.sums.clone();
-    if !close.is_empty() {
-        sums += &scores_of_close_rows(tiles, spectrum, &mean, &close, candidates)?;
+}
+
+/// A pass over rows in `f32`, for those that have little leverage.
+///
+/// Leave-one-out adds $e_i^2 ((1 - h_i)^{-2} - 1)$ to a squared residual, which is about $2 h_i$ of it. With
+/// $h_i$ up to 0.02 and a condition of up to 1e3, which is what the rounding of single precision may be
+/// multiplied by, the sum over rows is off by 1e-6 of itself at most, and as the errors of rows have
+/// nothing to do with each other by far less.
+struct Light {
+    to_u: Array2<f32>,
+    /// What each candidate keeps of each direction, shape (directions, candidates).
+    kept: Array2<f32>,
+    /// Of each output the output weights of all candidates, shape (neurons, candidates).
+    beta: Vec<Array2<f32>>,
+    total_weight: f32,
+    /// What leave-one-out adds, shape (candidates, outputs).
+    sums: Array2<f64>,
+}
+
+impl Light {
+    fn new(spectrum: &Spectrum<f64>, candidates: &[f64]) -> Self {
+        let narrow = |values: &Array2<f64>| values.mapv(f32::from_f64);
+        let mut kept = Array2::zeros((spectrum.s.len(), candidates.len()));
+        for (mut column, &lambda) in kept.columns_mut().into_iter().zip(candidates) {
+            column.assign(&spectrum.ridge_kept(lambda));
+        }
+        let gain = &kept / &spectrum.s.view().insert_axis(Axis(1));
+        let beta = |c: ArrayView1<'_, f64>| {
+            let along = &gain * &c.insert_axis(Axis(1));
+            narrow(&f64::product(spectrum.vt.t(), along.view()))
+        };
+        Self {
+            to_u: narrow(&(&spectrum.vt.t() / &spectrum.s)),
+            beta: spectrum.c.columns().into_iter().map(beta).collect(),
+            kept: narrow(&kept),
+            total_weight: f32::from_f64(spectrum.frame.total_weight),
+            sums: Array2::zeros((candidates.len(), spectrum.c.ncols())),
+        }
     }
-    scores.sums = sums;
-    let scores = scores.finish(candidates, roundoff);
-    spectrum.unreached = unreached;
-    Ok(scores)
+
+    /// Adds the rows of a tile; returns those that have too much leverage, and have not been added.
+    fn add(&mut self, tile: ArrayView2<'_, f64>) -> Vec<usize> {
+        /// The leverage up to which rows are light.
+        const LIGHT: f32 = 0.02;
+        let neurons = self.to_u.nrows();
+        let (hidden, rest) = tile.split_at(Axis(1), neurons);
+        let (targets, ones) = rest.split_at(Axis(1), self.beta.len());
+        let hidden = hidden.mapv(f32::from_f64);
+        let mut squared = f32::product(hidden.view(), self.to_u.view());
+        squared.mapv_inplace(|u| u * u);
+        let mut leverages = f32::product(squared.view(), self.kept.view());
+        let mut most = squared.sum_axis(Axis(1));
+        if let Some(roots) = ones.columns().into_iter().next() {
+            let own = roots.mapv(|root| f32::from_f64(root * root) / self.total_weight);
+            most += &own;
+            leverages += &own.insert_axis(Axis(1));
+        }
+        leverages.mapv_inplace(|h| h * (2.0 - h) / ((1.0 - h) * (1.0 - h)));
+        // Written so that NaN is heavy, too.
+        let heavy: Vec<usize> = (0..most.len())
+            .filter(|&row| !(most[row] <= LIGHT))
+            .collect();
+        for &row in &heavy {
+            leverages.row_mut(row).fill(0.0);
+        }
+        let outputs = targets.columns().into_iter().zip(&self.beta);
+        for ((targets, beta), mut sums) in outputs.zip(self.sums.columns_mut()) {
+            let fitted = f32::product(hidden.view(), beta.view());
+            for ((fitted, added), &target) in
+                fitted.rows().into_iter().zip(leverages.rows()).zip(targets)
+            {
+                Zip::from(&mut sums)
+                    .and(fitted)
+                    .and(added)
+                    .for_each(|sum, &fitted, &added| {
+                        if added > 0.0 {
+                            *sum += (target - f64::from(fitted)).powi(2) * f64::from(added);
+                        }
+                    });
+            }
+        }
+        heavy
+    }
 }
 
 /// Of hidden values and targets, in units of their scale.
@@ -174,6 +312,7 @@ fn scores_of_close_rows<A: Scalar>(
     mean: &[f64],
     close: &[usize],
     candidates: &[f64],
+    excess: bool,
 ) -> Result<Array2<f64>> {
     let neurons = tiles.neurons();
     let outputs = tiles.outputs();
@@ -205,7 +344,7 @@ fn scores_of_close_rows<A: Scalar>(
         });
     let none = Array1::zeros(hidden.nrows());
     let rows = RowSpectrum::of_rows(hidden, targets, constant, none, spectrum.frame.clone())?;
-    let mut scores = Scores::new(&rows.spectrum, candidates);
+    let mut scores = Scores::new(&rows.spectrum, candidates, excess);
     let from = rows.u.nrows() - close.len();
     scores.add(
         rows.u.slice(s![from.., ..]),

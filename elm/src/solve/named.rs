@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use serde::de::{self, Deserialize, Deserializer, MapAccess, Visitor};
 use serde::de::value::MapAccessDeserializer;
+use serde::de::{self, Deserialize, Deserializer, MapAccess, Visitor};
 
 use super::{Inverse, PseudoInverse, Ridge, Solver};
 
@@ -32,7 +32,11 @@ impl<'de> Visitor<'de> for NameOrSettings {
     type Value = Solver;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "a solver: one of {}, or one with its settings", Solver::NAMES)
+        write!(
+            f,
+            "a solver: one of {}, or one with its settings",
+            Solver::NAMES
+        )
     }
 
     fn visit_str<E: de::Error>(self, name: &str) -> Result<Solver, E> {

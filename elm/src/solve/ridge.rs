@@ -1,7 +1,7 @@
 //! Regularised least squares: $\beta = \arg\min \lVert H\beta - T\rVert^2 + \lambda
 //! s_1^2 \lVert\beta\rVert^2$.
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
 use serde::{Deserialize, Serialize};
 
 use super::frame::Prepared;
@@ -202,7 +202,7 @@ impl Ridge {
         tiles: &mut Tiles<'_, '_, A>,
         roundoff: f64,
     ) -> Result<Option<Solution<f64>>> {
-        let Some(mut spectrum) = tiles.spectrum()? else {
+        let Some(spectrum) = tiles.spectrum()? else {
             return Ok(None);
         };
         let reason = Reason::StrengthSearch;
@@ -211,14 +211,17 @@ impl Ridge {
             return Ok(Some(answer(&spectrum, reason, &lambda, None)));
         }
         let candidates = distinct(&spectrum);
-        let scores =
-            leave_one_out::scores_of_tiles(tiles, &mut spectrum, &candidates, roundoff)?;
+        let scores = self.worthwhile_scores(tiles, &spectrum, &candidates, roundoff)?;
         let (lambda, errors) = self.strengths_and_errors(&spectrum, &candidates, &scores);
         Ok(Some(answer(&spectrum, reason, &lambda, Some(errors))))
     }
 
     /// The answer by the best strength for predictions in arithmetic of this unit roundoff.
-    pub(super) fn search(self, problem: &LeastSquares<'_, f64>, roundoff: f64) -> Result<Solution<f64>> {
+    pub(super) fn search(
+        self,
+        problem: &LeastSquares<'_, f64>,
+        roundoff: f64,
+    ) -> Result<Solution<f64>> {
         let reason = Reason::StrengthSearch;
         if self.lambda == Lambda::Gcv {
             let spectrum = Spectrum::new(problem)?;
@@ -230,6 +233,41 @@ impl Ridge {
         // Without its only row a problem has nothing to place an intercept by.
         let errors = rows.spectrum.can_lose_a_row().then_some(errors);
         Ok(answer(&rows.spectrum, reason, &lambda, errors))
+    }
+
+    /// Leave-one-out scores of the candidates that may be chosen, and for the others, which hold too
+    /// much back, their squared residuals: scores are not below those, so that it is known afterwards
+    /// whether one of them might have been chosen. Then all are scored.
+    fn worthwhile_scores<A: Scalar>(
+        self,
+        tiles: &mut Tiles<'_, '_, A>,
+        spectrum: &Spectrum<f64>,
+        candidates: &[f64],
+        roundoff: f64,
+    ) -> Result<Array2<f64>> {
+        /// What generalised cross-validation may be off by.
+        const MARGIN: f64 = 1.05;
+        let rows = spectrum.frame.weighted_rows as f64;
+        let expected = gcv_scores(spectrum, candidates, roundoff) * (rows * rows);
+        let mut scores = leave_one_out::squared_residuals(spectrum, candidates);
+        let least = expected.fold_axis(Axis(0), f64::INFINITY, |least, score| least.min(*score));
+        let bound = least * MARGIN;
+        let may_be = |row: ArrayView1<'_, f64>| row.iter().zip(&bound).any(|(r, b)| r <= b);
+        // Squared residuals rise with the strength.
+        let count = scores
+            .axis_iter(Axis(0))
+            .rposition(may_be)
+            .map_or(0, |last| last + 1);
+        if count > 0 {
+            let some =
+                leave_one_out::scores_of_tiles(tiles, spectrum, &candidates[..count], roundoff)?;
+            scores.slice_mut(s![..count, ..]).assign(&some);
+            let chosen = self.choose(spectrum, &scores);
+            if chosen.iter().all(|&candidate| candidate < count) {
+                return Ok(scores);
+            }
+        }
+        leave_one_out::scores_of_tiles(tiles, spectrum, candidates, roundoff)
     }
 
     /// Solves without the rows, from which leave-one-out would choose: by generalised

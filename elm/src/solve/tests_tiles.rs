@@ -207,7 +207,10 @@ fn weights_count_and_rows_without_weight_may_hold_anything() {
         );
         assert_eq!(tiles.diagnosis.lambda, matrix.diagnosis.lambda);
         let apart = (&tiles.beta - &matrix.beta).mapv(f64::abs).sum();
-        assert!(apart <= 1e-7 * matrix.beta.mapv(f64::abs).sum(), "{apart:e}");
+        assert!(
+            apart <= 1e-7 * matrix.beta.mapv(f64::abs).sum(),
+            "{apart:e}"
+        );
     }
 }
 
@@ -221,7 +224,10 @@ fn rows_that_all_but_determine_their_own_fit_are_left_out_exactly() {
         let mut problem = Problem::new(hidden, 2, 0.3);
         problem.agrees(name);
         // One that the others do not foretell.
-        problem.targets.slice_mut(s![500, ..]).mapv_inplace(|t| 2.0 * t);
+        problem
+            .targets
+            .slice_mut(s![500, ..])
+            .mapv_inplace(|t| 2.0 * t);
         problem.agrees(name);
         problem.intercept = false;
         problem.agrees(name);
@@ -276,7 +282,10 @@ fn targets_without_noise_are_met_as_closely() {
         let tiles = error(&problem.by_tiles(Ridge::default()));
         let matrix = error(&problem.by_matrix(Ridge::default()));
         let size = problem.targets.mapv(|t| t * t).sum().sqrt();
-        assert!(tiles <= 10.0 * matrix + 1e-13 * size, "{tiles:e}, {matrix:e}");
+        assert!(
+            tiles <= 10.0 * matrix + 1e-13 * size,
+            "{tiles:e}, {matrix:e}"
+        );
     }
 }
 

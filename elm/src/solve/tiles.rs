@@ -8,11 +8,11 @@ use std::ops::Range;
 
 use ndarray::{Array1, Array2, ArrayView2, Axis, ShapeBuilder, s};
 
+use super::Route;
 use super::frame::Frame;
 use super::gram;
 use super::moments::{Moments, RowSource, centre_of, spread_runs};
 use super::spectrum::Spectrum;
-use super::Route;
 use crate::error::Result;
 use crate::linalg::{Kernel, Svd, Triangular};
 use crate::scalar::{Scalar, power_of_two};
@@ -453,10 +453,7 @@ fn squares(matrix: ArrayView2<'_, f64>) -> Array1<f64> {
 }
 
 /// For each column the largest $\sqrt{w_i} |a_{ij}|$, in `f64`.
-pub(super) fn magnitudes<A: Scalar>(
-    matrix: ArrayView2<'_, A>,
-    roots: &Array1<f64>,
-) -> Array1<f64> {
+pub(super) fn magnitudes<A: Scalar>(matrix: ArrayView2<'_, A>, roots: &Array1<f64>) -> Array1<f64> {
     let mut largest = Array1::zeros(matrix.ncols());
     for (row, root) in matrix.rows().into_iter().zip(roots) {
         for (largest, value) in largest.iter_mut().zip(row) {

@@ -255,3 +255,47 @@ fn a_fit_at_the_end_of_the_range_survives_json() {
     let again: Elm<f64> = persist::from_bytes(text.as_bytes()).unwrap();
     assert_eq!(again, model);
 }
+
+#[test]
+fn json_is_read_as_editors_leave_it() {
+    let model = &models()[0];
+    let text = persist::to_json(model).unwrap();
+    for before in ["", " ", "\n\t\r\n", "\u{feff}", "\u{feff}\r\n "] {
+        let again: Elm<f64> = persist::from_bytes(format!("{before}{text}\n ").as_bytes()).unwrap();
+        assert_eq!(&again, model);
+    }
+    for foreign in ["\u{feff}", "  elm", "\u{feff}[]"] {
+        let error = persist::from_bytes::<Elm<f64>>(foreign.as_bytes()).unwrap_err();
+        assert!(matches!(error, Error::Foreign), "{foreign:?}: {error}");
+    }
+}
+
+#[test]
+fn of_a_folder_that_is_not_there_its_name_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let missing = dir.path().join("no");
+    let path = missing.join("such/model.elm");
+    let error = persist::save(&models()[0], &path).unwrap_err().to_string();
+    let expected = format!("the folder {} does not exist", missing.display());
+    assert!(error.ends_with(&expected), "{error}");
+    assert!(
+        !error.contains("tmp-") && !error.contains("elm-tmp"),
+        "{error}"
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn a_private_file_stays_private_and_a_link_stays_a_link() {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+    let dir = tempfile::tempdir().unwrap();
+    let (file, link) = (dir.path().join("model.elm"), dir.path().join("latest.elm"));
+    persist::save(&models()[0], &file).unwrap();
+    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o600)).unwrap();
+    symlink("model.elm", &link).unwrap();
+    persist::save(&models()[1], &link).unwrap();
+    assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+    let mode = std::fs::metadata(&file).unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o600);
+    assert_eq!(persist::load::<Elm<f64>>(&file).unwrap(), models()[1]);
+}
