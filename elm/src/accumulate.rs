@@ -50,9 +50,10 @@ use crate::hidden::HiddenLayer;
 use crate::linalg::Triangular;
 use crate::model::{CheckedParams, Targets};
 use crate::network::{Elm, design};
+use crate::room::check_room;
 use crate::scalar::{Scalar, power_of_two};
 use crate::scaler::Scaler;
-use crate::solve::{Solver, check_length, check_matrix, check_room, check_weights};
+use crate::solve::{Solver, check_length, check_matrix, check_weights};
 
 /// Rows in, a triangle kept; see the [module](self).
 ///
@@ -191,7 +192,7 @@ impl<A: Scalar> Accumulator<A> {
                 second: "an accumulator",
             });
         }
-        let hidden = params.layer(sample, None)?;
+        let hidden = params.layer(sample.into(), None)?;
         let inputs = hidden.inputs();
         let direct_links = params.links_directly();
         let links = if direct_links { inputs } else { 0 };

@@ -133,7 +133,9 @@ pub enum Error {
         /// Which result.
         what: &'static str,
     },
-    /// An array would be larger than memory.
+    /// An array would be larger than memory. That is known before it is made: from the allocator and,
+    /// on Linux, from what the system says is left, to this program's control group, too. What other
+    /// programs take afterwards is not known: it can still end this one.
     #[error("{what} would be {rows} x {columns}, more than memory holds")]
     TooLarge {
         /// Which array.

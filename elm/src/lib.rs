@@ -60,6 +60,7 @@ mod numbers;
 pub mod persist;
 mod predictor;
 pub mod prune;
+mod room;
 mod scalar;
 mod scaler;
 mod simd;

@@ -8,10 +8,11 @@ use crate::error::{Error, Result};
 use crate::hidden::HiddenLayer;
 use crate::metrics::root_mean_squares;
 use crate::predictor::Predictor;
+use crate::room::check_room;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
 use crate::solve::spectrum::norm;
-use crate::solve::{Diagnosis, Reason, Solution, check_length, check_matrix, check_room};
+use crate::solve::{Diagnosis, Reason, Solution, check_length, check_matrix};
 
 /// Project, activate, and append the inputs where they are linked directly.
 pub(crate) fn design<A: Scalar>(

@@ -11,8 +11,8 @@
 //! - [`UncertainElm::predict_interval`]: the jackknife+ of Barber, Candès, Ramdas and Tibshirani
 //!   (Annals of Statistics 49(1), 2021), from exact leave-one-out residuals and the predictions of
 //!   the $n$ networks that each leave out one row, all in closed form. Assumes nothing of the noise
-//!   but that rows are exchangeable: an interval asked to cover $1 - \alpha$ covers at least
-//!   $1 - 2\alpha$ always, and about $1 - \alpha$ in practice.
+//!   but that rows are exchangeable: of settings that were not chosen on the rows, an interval asked to
+//!   cover $1 - \alpha$ covers at least $1 - 2\alpha$, and about $1 - \alpha$ in practice.
 //!
 //! Outside the training rows neither knows how the function goes on. Both then add what it may change
 //! by between the edge of the data, where predictions are [held](crate::bounds), and the row: with
@@ -21,8 +21,10 @@
 //! deviation, and $4r$ at either end of an interval. That is an assumption, that the function is no
 //! steeper outside than inside, and not a guarantee.
 //!
-//! Both take the random layer, its standardisation and $\lambda$ as given. Where the settings were
-//! chosen on the same rows, errors are a little larger than either says.
+//! Both take the random layer, its standardisation and $\lambda$ as given. Where these were chosen on
+//! the same rows, as $\lambda$ is by default and everything by [`ElmParams::auto`], nothing is
+//! guaranteed: errors are larger than either says, a little with many rows, and by a half with ten. There
+//! 90 % intervals cover 0.8 or more after a choice of $\lambda$ alone and about 0.75 after `auto`.
 //!
 //! ```
 //! use elm::ElmParams;

@@ -8,11 +8,11 @@ use super::Accumulator;
 use crate::error::{Error, Result};
 use crate::model::CheckedParams;
 use crate::network::Elm;
+#[cfg(feature = "rayon")]
+use crate::room::check_room;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
 use crate::solve::check_matrix;
-#[cfg(feature = "rayon")]
-use crate::solve::check_room;
 
 const NO_CHUNKS: Error = Error::Empty {
     what: "chunks",

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::{Group, HiddenLayer};
 use crate::activation::Activation;
 use crate::scalar::Scalar;
+use crate::scaler::Scaler;
 use crate::stats::Sum;
 
 /// The distribution that hidden weights and biases are drawn from, before scaling.
@@ -176,13 +177,51 @@ const WEIGHTS: u64 = 0;
 /// of the other choices.
 const ROWS: u64 = 2;
 
+/// Training inputs, standardised where they are looked at: a layer is laid on few of many rows.
+#[derive(Clone, Copy)]
+pub(crate) struct Inputs<'a, A: Scalar> {
+    x: ArrayView2<'a, A>,
+    scaler: Option<&'a Scaler<A>>,
+}
+
+impl<'a, A: Scalar> Inputs<'a, A> {
+    pub(crate) fn new(x: ArrayView2<'a, A>, scaler: Option<&'a Scaler<A>>) -> Self {
+        Self { x, scaler }
+    }
+
+    pub(crate) fn nrows(&self) -> usize {
+        self.x.nrows()
+    }
+
+    pub(crate) fn ncols(&self) -> usize {
+        self.x.ncols()
+    }
+
+    fn row(&self, row: usize) -> Array1<A> {
+        match self.scaler {
+            None => self.x.row(row).to_owned(),
+            Some(scaler) => {
+                let row = self.x.slice(s![row..=row, ..]);
+                scaler.transform(row).row(0).to_owned()
+            }
+        }
+    }
+}
+
+impl<'a, A: Scalar> From<ArrayView2<'a, A>> for Inputs<'a, A> {
+    fn from(x: ArrayView2<'a, A>) -> Self {
+        Self::new(x, None)
+    }
+}
+
 impl<A: Scalar> Plan<A> {
     /// Draws a layer for these (standardised) training rows with these positive weights.
-    pub(crate) fn draw(
+    pub(crate) fn draw<'a>(
         &self,
-        x: ArrayView2<'_, A>,
+        x: impl Into<Inputs<'a, A>>,
         weights: Option<ArrayView1<'_, A>>,
     ) -> HiddenLayer<A> {
+        let x = x.into();
         let places = Places::new(x.nrows(), weights);
         let neurons = self.groups.iter().map(|group| group.count).sum();
         let mut layer = HiddenLayer {
@@ -230,7 +269,7 @@ impl<A: Scalar> Plan<A> {
 
     fn projections(
         &self,
-        x: ArrayView2<'_, A>,
+        x: Inputs<'_, A>,
         places: &Places,
         group: &Neurons<A>,
         stream: u64,
@@ -279,7 +318,7 @@ impl<A: Scalar> Plan<A> {
     /// Centres in scaled inputs, shape (inputs, neurons), and the scale of each input.
     fn centres(
         &self,
-        x: ArrayView2<'_, A>,
+        x: Inputs<'_, A>,
         places: &Places,
         group: &Neurons<A>,
         random: &mut ChaCha8Rng,

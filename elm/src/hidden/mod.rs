@@ -17,8 +17,8 @@ use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 use crate::solve::{check_length, check_matrix};
 
-pub(crate) use draw::Plan;
 pub use draw::{Biases, Distribution, Kind, Neurons};
+pub(crate) use draw::{Inputs, Plan};
 
 /// The random hidden layer of a network: it is drawn, never trained.
 ///

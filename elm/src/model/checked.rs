@@ -5,13 +5,14 @@ use ndarray::{Array2, ArrayRef2, ArrayView1, ArrayView2};
 use super::{ElmParams, Rows, Targets};
 use crate::bounds::Bounds;
 use crate::error::{Error, Result};
-use crate::hidden::{HiddenLayer, Neurons};
+use crate::hidden::{HiddenLayer, Inputs, Neurons};
 use crate::network::{Elm, design};
 use crate::predictor::LayerRows;
+use crate::room::{check_copies, check_room};
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
 use crate::solve::moments::{HiddenRows, RowSource};
-use crate::solve::{LeastSquares, Solver, check_length, check_matrix, check_room};
+use crate::solve::{LeastSquares, Solver, check_length, check_matrix};
 use crate::validate::{FoldFit, HeldOut, Validator};
 
 /// Settings that are in range; made by [`ElmParams::check`].
@@ -166,7 +167,7 @@ impl<A: Scalar> CheckedParams<A> {
         }
         let nowhere = Array2::zeros((1, inputs));
         check_matrix("inputs", nowhere.view())?;
-        self.layer(nowhere.view(), None)
+        self.layer(nowhere.view().into(), None)
     }
 
     /// Held-out predictions for every row, from one random layer and one factorisation: `folds`
@@ -261,10 +262,7 @@ impl<A: Scalar> CheckedParams<A> {
         let (x, weights) = (rows.x(), rows.weights());
         check_size(x, self.0.neurons())?;
         let scaler = self.0.standardise.then(|| Scaler::measure(x, weights));
-        let hidden = match &scaler {
-            Some(scaler) if self.needs_rows() => self.layer(scaler.transform(x).view(), weights)?,
-            _ => self.layer(x, weights)?,
-        };
+        let hidden = self.layer(Inputs::new(x, scaler.as_ref()), weights)?;
         Ok((scaler, hidden))
     }
 
@@ -275,7 +273,14 @@ impl<A: Scalar> CheckedParams<A> {
         scaler: Option<&Scaler<A>>,
         hidden: &HiddenLayer<A>,
     ) -> Result<Array2<A>> {
-        check_room("the hidden-layer matrix", x.nrows(), hidden.neurons())?;
+        // The matrix itself, prepared for a factorisation, the factorisation's own copy and a factor.
+        let columns = hidden.neurons() + if self.0.direct_links { x.ncols() } else { 0 };
+        check_copies(
+            "the hidden-layer matrix with its factors",
+            x.nrows(),
+            columns,
+            4,
+        )?;
         let scaled = scaler.map(|scaler| scaler.transform(x));
         let x = scaled.as_ref().map_or(x, |scaled| scaled.view());
         Ok(design(hidden, self.0.direct_links, x))
@@ -297,7 +302,7 @@ impl<A: Scalar> CheckedParams<A> {
     /// The random layer for these (standardised) rows with these positive weights.
     pub(crate) fn layer(
         &self,
-        x: ArrayView2<'_, A>,
+        x: Inputs<'_, A>,
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<HiddenLayer<A>> {
         let params = &self.0;

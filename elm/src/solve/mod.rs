@@ -429,21 +429,6 @@ pub(crate) fn check_length(what: &'static str, found: usize, expected: usize) ->
     }
 }
 
-/// Whether an array of this size can be allocated at all.
-pub(crate) fn check_room(what: &'static str, rows: usize, columns: usize) -> Result<()> {
-    let too_large = Error::TooLarge {
-        what,
-        rows,
-        columns,
-    };
-    let Some(entries) = rows.checked_mul(columns) else {
-        return Err(too_large);
-    };
-    // Layers are drawn in f64 whatever they are kept in.
-    let room = Vec::<f64>::new().try_reserve_exact(entries);
-    room.map_err(|_| too_large)
-}
-
 impl From<Failure> for Error {
     fn from(failure: Failure) -> Self {
         match failure {

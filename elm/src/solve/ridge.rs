@@ -41,6 +41,10 @@ pub enum Lambda {
 /// whatever the type, since an ELM's directions fall far below the resolution of `f32`; $u$
 /// is that of the type.
 ///
+/// Of rows that far outnumber neurons neither the hidden-layer matrix nor its factors are kept: they are
+/// made a tile at a time, twice for leave-one-out, and the answer is the same to within rounding. Memory
+/// beside the data is then a small multiple of neurons squared, and a number for each row.
+///
 /// ```
 /// use elm::solve::{LeastSquares, Ridge, Solver};
 /// use ndarray::array;

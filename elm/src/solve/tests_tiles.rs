@@ -216,9 +216,13 @@ fn weights_count_and_rows_without_weight_may_hold_anything() {
 
 #[test]
 fn rows_that_all_but_determine_their_own_fit_are_left_out_exactly() {
-    for (name, mut hidden) in [("normal", normal(900, 10, 11)), ("smooth", smooth(900, 12))] {
-        for (size, row) in [(1e4, 17), (1e6, 500), (1e7, 899)] {
-            let own = normal(1, hidden.ncols(), row as u64) * size;
+    // A condition of 1e7 in both cases.
+    for (name, mut hidden, unit) in [
+        ("normal", normal(900, 10, 11), 1e4),
+        ("graded", graded(900, 10, 100.0), 1e2),
+    ] {
+        for (size, row) in [(1.0, 17), (1e2, 500), (1e3, 899)] {
+            let own = normal(1, hidden.ncols(), row as u64) * (size * unit);
             hidden.row_mut(row).assign(&own.row(0));
         }
         let mut problem = Problem::new(hidden, 2, 0.3);
