@@ -267,9 +267,9 @@ impl Light {
             leverages += &own.insert_axis(Axis(1));
         }
         leverages.mapv_inplace(|h| h * (2.0 - h) / ((1.0 - h) * (1.0 - h)));
-        // Written so that NaN is heavy, too.
+        // What is not a number is heavy, too.
         let heavy: Vec<usize> = (0..most.len())
-            .filter(|&row| !(most[row] <= LIGHT))
+            .filter(|&row| !(0.0..=LIGHT).contains(&most[row]))
             .collect();
         for &row in &heavy {
             leverages.row_mut(row).fill(0.0);

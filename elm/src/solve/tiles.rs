@@ -258,7 +258,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
             return Ok(None);
         }
         let s = s.mapv_into(f64::sqrt);
-        let c = f64::product(vt.view(), moments.right.view()) / &s.view().insert_axis(Axis(1));
+        let c = f64::product(vt.view(), moments.right.view()) / s.view().insert_axis(Axis(1));
         let unreached = &moments.squares - &squares(c.view());
         let explained = |(&left, &all): (&f64, &f64)| all > 0.0 && left < UNEXPLAINED * all;
         if unreached.iter().zip(&moments.squares).any(explained) {
