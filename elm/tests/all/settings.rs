@@ -167,6 +167,7 @@ fn a_trial_without_a_score_is_read_again() {
         neurons: 3,
         scale: 1.0,
         input_scales: Vec::new(),
+        direct_links: false,
         score: f64::INFINITY,
     };
     let text = serde_json::to_string(&trial).unwrap();
