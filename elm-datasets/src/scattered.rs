@@ -28,8 +28,9 @@
 mod angles;
 mod columns;
 mod long;
+mod note;
+mod problem;
 
-use std::fmt;
 use std::io::{self, Read, Write};
 use std::path::Path;
 
@@ -42,6 +43,8 @@ pub(crate) use angles::HORIZON_TOLERANCE;
 use angles::{Found, Reader};
 pub use columns::List;
 use columns::Plan;
+pub use note::Note;
+pub use problem::Problem;
 
 const ANGLES: [&str; 4] = ["theta_i", "phi_i", "theta_o", "phi_o"];
 const VECTORS: [&str; 6] = ["wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z"];
@@ -76,235 +79,6 @@ pub struct Columns {
     /// Whether the values are BRDF times the cosine of `theta_o`, the scatter angle. They are then
     /// divided by it.
     pub scatter_cosine: bool,
-}
-
-/// What was assumed of a table, or left out of it.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub enum Note {
-    /// Directions a rounding below the horizon.
-    Horizon {
-        /// How many.
-        directions: usize,
-    },
-    /// Negative polar angles.
-    Mirrored {
-        /// How many.
-        angles: usize,
-    },
-    /// Rows with the viewer below the surface.
-    Transmitted {
-        /// How many.
-        rows: usize,
-        /// Unit of the angles.
-        unit: AngleUnit,
-    },
-    /// Degrees that may be radians.
-    LooksLikeRadians {
-        /// The largest polar angle.
-        theta: f64,
-    },
-    /// Radians that may be degrees.
-    LooksLikeDegrees {
-        /// The largest azimuth.
-        phi: f64,
-    },
-    /// Columns that are no channels.
-    LeftOut {
-        /// Their names.
-        columns: List,
-    },
-    /// A row per wavelength.
-    Pivoted {
-        /// Rows of the file.
-        rows: usize,
-        /// Wavelengths.
-        channels: usize,
-        /// Pairs of directions.
-        pairs: usize,
-    },
-}
-
-impl fmt::Display for Note {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Horizon { directions } => write!(
-                f,
-                "{directions} directions up to 0.029 degrees below the horizon were taken to be on it"
-            ),
-            Self::Mirrored { angles } => write!(
-                f,
-                "{angles} polar angles are negative: taken as on the other side of the normal, half a \
-                 turn added to their azimuths"
-            ),
-            Self::Transmitted { rows, unit } => {
-                write!(
-                    f,
-                    "{rows} rows have the viewer below the surface (transmitted light) and were left out"
-                )?;
-                match unit {
-                    AngleUnit::Radians => f.write_str("; if the angles are degrees, say --degrees"),
-                    AngleUnit::Degrees => Ok(()),
-                }
-            }
-            Self::LooksLikeRadians { theta } => write!(
-                f,
-                "no polar angle is above {theta} degrees: if these are radians, leave out --degrees"
-            ),
-            Self::LooksLikeDegrees { phi } => write!(
-                f,
-                "azimuths go up to {phi} radians: if the angles are degrees, say --degrees"
-            ),
-            Self::LeftOut { columns } => write!(f, "columns left out: {columns}"),
-            Self::Pivoted {
-                rows,
-                channels,
-                pairs,
-            } => write!(
-                f,
-                "{rows} rows of one wavelength each became {pairs} pairs of directions with \
-                 {channels} channels"
-            ),
-        }
-    }
-}
-
-/// What is wrong with a table of samples.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Problem {
-    /// Neither set of direction columns is complete.
-    #[error(
-        "expected the columns {}, or {}; missing {}",
-        ANGLES.join(", "),
-        VECTORS.join(", "),
-        missing.join(", ")
-    )]
-    NoDirections {
-        /// The columns missing of the set that is more nearly complete.
-        missing: Vec<&'static str>,
-    },
-    /// Columns of both sets.
-    #[error("expected directions as angles or as vectors, found columns of both")]
-    BothDirections,
-    /// No column is left for the values.
-    #[error("expected a column of values beside those of the directions")]
-    NoValues,
-    /// A polar angle that is negative or below the horizon.
-    #[error(
-        "expected {angle} from 0 to {}, found {found}{}",
-        if *unit == AngleUnit::Radians { "pi/2 radians" } else { "90 degrees" },
-        if *unit == AngleUnit::Radians { " (angles in degrees need --degrees)" } else { "" }
-    )]
-    PolarAngle {
-        /// Name of the column.
-        angle: &'static str,
-        /// Unit of the angles.
-        unit: AngleUnit,
-        /// The angle found, in that unit.
-        found: f64,
-    },
-    /// Angles said to be degrees that can hardly be any.
-    #[error(
-        "no polar angle is above {theta} degrees and no azimuth above {phi}: these are radians, so \
-         leave out --degrees"
-    )]
-    LooksLikeRadians {
-        /// The largest polar angle.
-        theta: f64,
-        /// The largest azimuth.
-        phi: f64,
-    },
-    /// Columns whose names are not those of reflectance.
-    #[error(
-        "these columns do not look like reflectance: {columns}; leave them out with --ignore, or \
-         name the columns of reflectance with --channels"
-    )]
-    NotReflectance {
-        /// The names.
-        columns: List,
-    },
-    /// A column asked for that is not there, or named twice.
-    #[error("expected {name:?} to be one column of reflectance; there are {columns}")]
-    NoSuchColumn {
-        /// The name asked for, shortened if long.
-        name: String,
-        /// The names there are.
-        columns: List,
-    },
-    /// A table with a row per wavelength that has several values in a row.
-    #[error(
-        "expected one column of values beside the wavelength, found {columns}; name it with --channels"
-    )]
-    SeveralPerWavelength {
-        /// The names.
-        columns: List,
-    },
-    /// A wavelength that is none.
-    #[error("expected a wavelength, and at most 1000 different ones, found {found}")]
-    Wavelength {
-        /// The number.
-        found: f64,
-    },
-    /// A row that lacks a value, where nothing can be left out.
-    #[error("expected a value in every row, found none for {channel}")]
-    NoValue {
-        /// The channel, shortened if long.
-        channel: String,
-    },
-    /// A vector that is no direction.
-    #[error("expected {vector} to be a unit vector, found length {found}")]
-    Length {
-        /// `wi` or `wo`.
-        vector: &'static str,
-        /// The length.
-        found: f64,
-    },
-    /// A vector that points into the surface.
-    #[error("expected {vector} above the surface, found {vector}_z = {found}")]
-    BelowHorizon {
-        /// `wi` or `wo`.
-        vector: &'static str,
-        /// The third component.
-        found: f64,
-    },
-    /// A cosine-weighted value from which the BRDF cannot be had back.
-    #[error(
-        "expected {direction} above the horizon, for the values are to be divided by cos {angle}"
-    )]
-    NoCosine {
-        /// The light or the viewer.
-        direction: &'static str,
-        /// Its polar angle.
-        angle: &'static str,
-    },
-    /// Samples to be written that do not fit together.
-    #[error(
-        "expected as many directions as rows, and names as columns; found {directions} directions \
-         and {names} names for values of shape {shape:?}"
-    )]
-    Shape {
-        /// Pairs of directions.
-        directions: usize,
-        /// Names of channels.
-        names: usize,
-        /// Shape of the values.
-        shape: (usize, usize),
-    },
-    /// A channel to be written whose name would not be read back as one.
-    #[error("expected a name of its own for each channel, found {name:?}")]
-    ChannelName {
-        /// The name, shortened if long.
-        name: String,
-    },
-    /// A number to be written that is not finite.
-    #[error("expected finite numbers, found {found} in the column {column:?}")]
-    NotFinite {
-        /// Name of the column, shortened if long.
-        column: String,
-        /// The number.
-        found: f64,
-    },
 }
 
 /// Reads samples from a CSV file.
@@ -418,13 +192,16 @@ fn parse(
         let begin = begins.get(row).copied().unwrap_or(u64::MAX);
         error(line_of(bytes, begin), problem)
     };
-    let (rows, mut samples, mut notes) =
-        reflected(&table, &plan, options, choice).map_err(|(row, problem)| {
-            row.map_or_else(
-                || error(head(), problem.clone()),
-                |row| at(row, problem.clone()),
-            )
-        })?;
+    let Reflected {
+        rows,
+        mut samples,
+        mut notes,
+    } = reflected(&table, &plan, options, choice).map_err(|(row, problem)| {
+        row.map_or_else(
+            || error(head(), problem.clone()),
+            |row| at(row, problem.clone()),
+        )
+    })?;
     if let Some(column) = plan.wavelength {
         let wavelengths = table.values.column(column).select(Axis(0), &rows).to_vec();
         samples = long::pivot(&samples, &wavelengths, &names[column])
@@ -444,10 +221,14 @@ fn parse(
     Ok(Parsed { samples, notes })
 }
 
-/// The rows above the surface, their samples, and what was assumed.
-type Reflected = (Vec<usize>, Samples, Vec<Note>);
+/// The rows of a table that are above the surface, with their samples, and what was assumed.
+struct Reflected {
+    rows: Vec<usize>,
+    samples: Samples,
+    notes: Vec<Note>,
+}
 
-/// What lies above the surface; in an error the row, if it is one's.
+/// Reads directions and values; in an error the row, if it is one's.
 fn reflected(
     table: &Table,
     plan: &Plan,
@@ -514,7 +295,11 @@ fn reflected(
         values,
         channels: names.collect(),
     };
-    Ok((rows, samples, notes))
+    Ok(Reflected {
+        rows,
+        samples,
+        notes,
+    })
 }
 
 /// Of the channels that wavelengths have become those that were asked for, if any were.

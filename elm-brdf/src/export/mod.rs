@@ -156,8 +156,9 @@ pub enum ExportError {
     },
     /// A model that single precision would spoil.
     #[error(
-        "single precision would move its values by {found:.2e} 1/sr, more than {}: fit fewer neurons \
-         (fit --neurons N), or export a table, which is made in double precision (--format merl)",
+        "single precision would move its values by {found:.2e} 1/sr, more than {}: fit it anew, with \
+         fewer neurons (fit --neurons N), or export a table, which is made in double precision \
+         (--format merl)",
         precision::allowed(*limit, *held_out)
     )]
     Precision {

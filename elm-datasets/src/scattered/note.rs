@@ -1,0 +1,96 @@
+//! What was assumed of a table.
+
+use std::fmt;
+
+use super::{AngleUnit, List};
+
+/// What was assumed of a table, or left out of it.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Note {
+    /// Directions a rounding below the horizon.
+    Horizon {
+        /// How many.
+        directions: usize,
+    },
+    /// Negative polar angles.
+    Mirrored {
+        /// How many.
+        angles: usize,
+    },
+    /// Rows with the viewer below the surface.
+    Transmitted {
+        /// How many.
+        rows: usize,
+        /// Unit of the angles.
+        unit: AngleUnit,
+    },
+    /// Degrees that may be radians.
+    LooksLikeRadians {
+        /// The largest polar angle.
+        theta: f64,
+    },
+    /// Radians that may be degrees.
+    LooksLikeDegrees {
+        /// The largest azimuth.
+        phi: f64,
+    },
+    /// Columns that are no channels.
+    LeftOut {
+        /// Their names.
+        columns: List,
+    },
+    /// A row per wavelength.
+    Pivoted {
+        /// Rows of the file.
+        rows: usize,
+        /// Wavelengths.
+        channels: usize,
+        /// Pairs of directions.
+        pairs: usize,
+    },
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Horizon { directions } => write!(
+                f,
+                "{directions} directions up to 0.029 degrees below the horizon were taken to be on it"
+            ),
+            Self::Mirrored { angles } => write!(
+                f,
+                "{angles} polar angles are negative: taken as on the other side of the normal, half a \
+                 turn added to their azimuths"
+            ),
+            Self::Transmitted { rows, unit } => {
+                write!(
+                    f,
+                    "{rows} rows have the viewer below the surface (transmitted light) and were left out"
+                )?;
+                match unit {
+                    AngleUnit::Radians => f.write_str("; if the angles are degrees, say --degrees"),
+                    AngleUnit::Degrees => Ok(()),
+                }
+            }
+            Self::LooksLikeRadians { theta } => write!(
+                f,
+                "no polar angle is above {theta} degrees: if these are radians, leave out --degrees"
+            ),
+            Self::LooksLikeDegrees { phi } => write!(
+                f,
+                "azimuths go up to {phi} radians: if the angles are degrees, say --degrees"
+            ),
+            Self::LeftOut { columns } => write!(f, "columns left out: {columns}"),
+            Self::Pivoted {
+                rows,
+                channels,
+                pairs,
+            } => write!(
+                f,
+                "{rows} rows of one wavelength each became {pairs} pairs of directions with \
+                 {channels} channels"
+            ),
+        }
+    }
+}
