@@ -235,16 +235,17 @@ fn what_is_called_held_out_is_of_the_network_itself() {
         };
         let model = tuned.fit_model(&pairs, values.view()).unwrap();
         let held_out = model.provenance().held_out.unwrap().log_cosine_mae;
-        let truth = Array2::from_shape_fn((apart.len(), 1), |(row, _)| value(plastic, &apart[row]));
+        // Rows that nothing saw, with noise of the same size.
+        let fresh = measured(plastic, &apart, 0.01);
         let fitted = model.eval(&apart).unwrap();
-        let metrics = elm_brdf::metrics::Metrics::of(&apart, fitted.view(), truth.view()).unwrap();
-        // Held-out rows have noise, which the truth has not: 1 % of values near 0.1 to 1.
-        let ratio = (held_out - 1e-3) / metrics.log_cosine_mae;
-        assert!((0.3..2.0).contains(&ratio), "{held_out} {metrics:?}");
+        let metrics = elm_brdf::metrics::Metrics::of(&apart, fitted.view(), fresh.view()).unwrap();
+        let ratio = held_out / metrics.log_cosine_mae;
+        assert!((0.75..1.5).contains(&ratio), "{held_out} {metrics:?}");
         figures.push(held_out);
     }
+    // Of three networks, not of one trial that all came from.
     assert!(
-        figures[0] > figures[1] && figures[1] > figures[2],
+        figures[0] != figures[1] && figures[1] != figures[2] && figures[0] != figures[2],
         "{figures:?}"
     );
 }

@@ -51,7 +51,11 @@ fn one_factorisation_is_refitting(data: &Measurements) {
         Solver::from(PseudoInverse::default()),
         Ridge::relative(1e-9).into(),
     ] {
-        let params = ElmParams::new(50).solver(solver).intercept(false).seed(1);
+        let params = ElmParams::new(50)
+            .solver(solver)
+            .intercept(false)
+            .bounded(false)
+            .seed(1);
         // All folds of all materials, from one call and one factorisation.
         let fits = params
             .clone()

@@ -308,23 +308,20 @@ mod tests {
             let moments = Moments::of(h.view(), t.view(), None);
             let validator =
                 Validator::new(&LeastSquares::new(&h, &t).unwrap().intercept(true)).unwrap();
-            // The same absolute strength; the library's are relative to the largest singular value.
-            let about_means = &h - &h.mean_axis(Axis(0)).unwrap();
-            let gram = about_means.t().dot(&about_means);
-            let mut vector = Array1::ones(neurons);
-            for _ in 0..2000 {
-                vector = gram.dot(&vector);
-                vector /= vector.dot(&vector).sqrt();
-            }
-            let largest = vector.dot(&gram.dot(&vector));
             let mut differences = Vec::new();
             for relative in [1e-6, 1e-3] {
-                let factor = moments.factor(relative * largest).unwrap();
                 let solution = validator.solve(&[relative]).unwrap();
+                // The same absolute strength; the library's are relative.
+                let largest = solution.diagnosis.largest_singular_value.powi(2);
+                let factor = moments.factor(relative * largest).unwrap();
                 let weights = factor.solve(&moments);
                 let predicted = weights.apply(h.view());
                 let expected = h.dot(&solution.beta) + &solution.intercept;
-                assert_abs_diff_eq!(predicted, expected, epsilon = 1e-7);
+                // Of normal equations of n columns: n epsilon times their condition, which the
+                // strength keeps at its reciprocal (Higham 2002, ch. 10).
+                let size = t.iter().map(|t| t * t).sum::<f64>().sqrt();
+                let error = (neurons + 1) as f64 * f64::EPSILON / relative * size;
+                assert_abs_diff_eq!(predicted, expected, epsilon = error);
                 let evidence = validator.log_evidence(&[relative]).unwrap();
                 differences.push(factor.evidence(&moments)[1] - evidence[1]);
             }
