@@ -302,12 +302,12 @@ fn damaged_and_lying_files_are_refused() {
     lie("\"sum-difference\"", "\"half-diff\"");
     lie("\"sum-difference\"", "\"no such inputs\"");
     // More neurons than there are weights, and more than memory holds.
-    let (_, rest) = json.split_once("\"count\": ").unwrap();
+    let (_, rest) = json.split_once("\"neurons\": ").unwrap();
     let digits = rest.split(|c: char| !c.is_ascii_digit()).next().unwrap();
     let count: usize = digits.parse().unwrap();
-    let neurons = format!("\"count\": {count}");
-    lie(&neurons, &format!("\"count\": {}", count + 1));
-    lie(&neurons, "\"count\": 18446744073709551615");
+    let neurons = format!("\"neurons\": {count}");
+    lie(&neurons, &format!("\"neurons\": {}", count + 1));
+    lie(&neurons, "\"neurons\": 18446744073709551615");
     lie("\"offset\": ", "\"offset\": -");
     lie("elm-brdf model", "elm model");
 }
