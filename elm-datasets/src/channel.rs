@@ -326,7 +326,7 @@ fn wavelength(words: &[String]) -> Option<f64> {
 }
 
 /// A number of optical wavelengths that says itself whether it is in nm or in um.
-pub(crate) fn in_nm(number: f64) -> Option<f64> {
+fn in_nm(number: f64) -> Option<f64> {
     if (100.0..=25_000.0).contains(&number) {
         Some(number)
     } else if (0.1..=25.0).contains(&number) && number.fract() != 0.0 {

@@ -124,6 +124,10 @@ fn a_row_per_wavelength_becomes_a_channel_per_wavelength() {
         let red = read("a.csv", &text, &with(&["brdf", "650"], &[])).unwrap();
         assert_eq!(red.samples.values, array![[0.01], [0.03]]);
     }
+    // A column has one unit.
+    let text = format!("{ANGLES},lambda,brdf\n10,0,20,0,0.5,1\n10,0,20,0,1.0,2\n10,0,20,0,2,3\n");
+    let opened = read("a.csv", &text, &degrees()).unwrap();
+    assert_eq!(opened.samples.channels, ["500 nm", "1000 nm", "2000 nm"]);
     // A pair that lacks a wavelength is left out and counted; a table without one is refused.
     let text = format!("{ANGLES},lambda,brdf\n10,0,20,0,450,1\n10,0,20,0,650,2\n30,0,20,0,450,3\n");
     let opened = read("a.csv", &text, &degrees()).unwrap();

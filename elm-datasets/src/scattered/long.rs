@@ -23,11 +23,10 @@ pub(super) fn pivot(
     wavelengths: &[f64],
     column: &str,
 ) -> Result<Samples, (usize, f64)> {
-    let unit = channel::unit(column);
-    let nm = |wavelength: f64| match unit {
-        Some(factor) => factor * wavelength,
-        None => channel::in_nm(wavelength).unwrap_or(wavelength),
-    };
+    let largest = wavelengths.iter().copied().fold(0.0, f64::max);
+    // One unit for the whole column: no optical wavelength is below 26 nm, and none above 25 um.
+    let factor = channel::unit(column).unwrap_or(if largest <= 25.0 { 1000.0 } else { 1.0 });
+    let nm = |wavelength: f64| factor * wavelength;
     let mut distinct: Vec<f64> = Vec::new();
     let mut places: HashMap<u64, usize> = HashMap::new();
     for (row, &wavelength) in wavelengths.iter().enumerate() {
@@ -75,13 +74,33 @@ pub(super) fn pivot(
     for (row, column, value) in cells {
         values[[row, column]] = value;
     }
+    let lengths: Vec<f64> = order.iter().map(|&index| nm(distinct[index])).collect();
     Ok(Samples {
         directions,
         values,
-        // Digits that a conversion to nm adds say nothing, a thousandth of a picometre neither.
-        channels: order
-            .iter()
-            .map(|&index| format!("{} nm", (nm(distinct[index]) * 1e6).round() / 1e6))
-            .collect(),
+        channels: names(&lengths).map_err(|found| (0, found))?,
     })
+}
+
+/// A name for each of these wavelengths, which ascend.
+///
+/// # Errors
+/// One that is no different from the one before it.
+fn names(lengths: &[f64]) -> Result<Vec<String>, f64> {
+    // Digits that a conversion to nm adds say nothing, a thousandth of a picometre neither.
+    let rounded: Vec<f64> = lengths.iter().map(|nm| (nm * 1e6).round() / 1e6).collect();
+    let repeated = |lengths: &[f64]| {
+        lengths
+            .windows(2)
+            .find(|two| two[0] >= two[1])
+            .map(|two| two[1])
+    };
+    let lengths = match repeated(&rounded) {
+        None => &rounded[..],
+        Some(_) => lengths,
+    };
+    match repeated(lengths) {
+        None => Ok(lengths.iter().map(|nm| format!("{nm} nm")).collect()),
+        Some(found) => Err(found),
+    }
 }
