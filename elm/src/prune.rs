@@ -93,7 +93,7 @@ pub struct Size {
     pub score: f64,
 }
 
-/// A pruned network; made by [`ElmParams::fit_pruned`].
+/// A pruned network; made by [`ElmParams::fit_pruned`](crate::ElmParams::fit_pruned).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pruned<A: Scalar> {
     /// The network of the neurons that are kept.
