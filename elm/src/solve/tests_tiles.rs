@@ -122,8 +122,7 @@ impl<A: Scalar> Problem<A> {
             close(&d.degrees_of_freedom, &e.degrees_of_freedom, bound, name);
             close(&d.residual_norm, &e.residual_norm, 1e-6, name);
             if let (Some(d), Some(e)) = (&d.leave_one_out, &e.leave_one_out) {
-                // Residuals over 1 - h, which either route has to some epsilon times the root of
-                // the size: where a row all but determines its own fit, 1 - h = 1e-9 and less.
+                // 1.6e-6 was seen at a condition of 1e7 on OpenBLAS; not derived.
                 close(d, e, 1e-5, name);
             } else {
                 assert_eq!(d.leave_one_out, e.leave_one_out);
