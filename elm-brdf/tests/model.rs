@@ -62,7 +62,7 @@ fn tuned(features: Option<Features>) -> Tuned {
 fn values_are_finite_and_not_negative_for_every_pair_of_directions() {
     let (pairs, values) = measured(7);
     let few = tuned(None).fit_model(&pairs, values.view()).unwrap();
-    let paint = paint::samples(2000, 1).unwrap();
+    let paint = paint::samples(3200, 1).unwrap();
     let many = tuned(None)
         .fit_model(&geometry::pairs(&paint.directions), paint.values.view())
         .unwrap();
@@ -160,7 +160,7 @@ fn below_either_horizon_a_model_is_black() {
 /// Models of every kind of layer: averaged, of one draw, pruned, given, and laid on rows.
 fn kinds() -> Vec<BrdfModel> {
     let (pairs, values) = measured(12);
-    let paint = paint::samples(1600, 1).unwrap();
+    let paint = paint::samples(3200, 1).unwrap();
     let params = |network: ElmParams<f64>| BrdfParams {
         features: Features::HalfDiff,
         link: Link::CubeRoot,
@@ -238,7 +238,7 @@ fn stored_numbers_are_those_that_the_file_holds() {
 #[test]
 fn no_more_numbers_are_stored_than_allowed() {
     let (pairs, values) = measured(3);
-    let paint = paint::samples(1600, 1).unwrap();
+    let paint = paint::samples(3200, 1).unwrap();
     let many = geometry::pairs(&paint.directions);
     for most in [40, 100, 675] {
         let tuned = Tuned {

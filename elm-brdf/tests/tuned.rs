@@ -223,7 +223,7 @@ fn one_curve_is_smooth_off_its_plane() {
 
 #[test]
 fn what_is_called_held_out_is_of_the_network_itself() {
-    let pairs = scattered(3000, 1.45, 10);
+    let pairs = scattered(3500, 1.45, 10);
     let values = measured(plastic, &pairs, 0.01);
     let apart = scattered(3000, 1.45, 11);
     let mut figures = Vec::new();

@@ -105,7 +105,7 @@ impl Default for Tuned {
 
 impl Tuned {
     /// With more measurements than this they count as many.
-    pub const MANY: usize = 1500;
+    pub const MANY: usize = 3000;
     /// Neurons that measurements always warrant, if there are as many.
     const FEWEST: usize = 48;
     /// Candidates whose neurons stand side by side for few measurements.

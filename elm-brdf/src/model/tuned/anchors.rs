@@ -20,8 +20,10 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::geometry::{NORMAL, Pair, cartesian, dot};
 
-/// Anchors laid.
+/// Anchors laid over the hemisphere, and further ones for light and viewer near the horizon, where
+/// measurements end and a highlight's extrapolation grows fastest.
 const ANCHORS: usize = 600;
+const GRAZING: usize = 200;
 /// Measurements that a guess is the mean of.
 const NEAREST: usize = 6;
 /// Measurements listed for each anchor, so that some are left when a fold is left out.
@@ -172,10 +174,10 @@ impl Anchors {
     }
 }
 
-/// Pairs of directions over the hemisphere: half of them anywhere by both angles, half by the half
-/// vector, near the mirror direction.
+/// Pairs of directions over the hemisphere: half of [`ANCHORS`] anywhere by both angles, half by the
+/// half vector, near the mirror direction; and [`GRAZING`] ones in both of whose directions near the horizon.
 fn scatter(random: &mut ChaCha8Rng) -> Vec<Pair> {
-    let mut pairs = Vec::with_capacity(ANCHORS);
+    let mut pairs = Vec::with_capacity(ANCHORS + GRAZING);
     while pairs.len() < ANCHORS {
         if pairs.len() % 2 == 0 {
             let mut theta = || random.random_range(0.0..FRAC_PI_2);
@@ -206,6 +208,15 @@ fn scatter(random: &mut ChaCha8Rng) -> Vec<Pair> {
                 incident: cartesian(theta, 0.0),
                 outgoing: cartesian(theta, PI * (1.0 - part * part)),
             }
+        });
+    }
+    for _ in 0..GRAZING {
+        let mut theta = || FRAC_PI_2 * (1.0 - 0.25 * random.random_range(0.0_f64..1.0).powi(2));
+        let (theta_i, theta_o) = (theta(), theta());
+        let part: f64 = random.random_range(0.0..1.0);
+        pairs.push(Pair {
+            incident: cartesian(theta_i, 0.0),
+            outgoing: cartesian(theta_o, PI * (1.0 - part * part)),
         });
     }
     pairs

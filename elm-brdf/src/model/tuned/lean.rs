@@ -35,7 +35,7 @@ use crate::model::{BrdfModel, Layer};
 /// has the least error on rows that it was not fitted to, of 1500 to fit and 1500 to judge at most;
 /// of many rows the scale of each input is then moved where that lowers this error. At last the output
 /// weights are fitted to all rows, by a ridge whose strength leave-one-out chooses where there are
-/// few ([`Tuned::MANY`](super::Tuned::MANY)).
+/// few (up to 1500).
 ///
 /// ```
 /// use elm_brdf::{batch::Packed, geometry::pairs, model::Lean};
@@ -139,7 +139,7 @@ impl Lean {
             }
             .into());
         };
-        if pairs.len() > super::Tuned::MANY {
+        if pairs.len() > ROWS {
             for (step, input) in STEPS
                 .into_iter()
                 .flat_map(|s| (0..x.ncols()).map(move |i| (s, i)))
@@ -178,7 +178,7 @@ impl Fit for Lean {
 /// Of many measurements the noise averages out; of few, leave-one-out says how strong a ridge it
 /// takes.
 fn ridge(rows: usize) -> Ridge {
-    if rows > super::Tuned::MANY {
+    if rows > ROWS {
         Ridge::relative(RIDGE)
     } else {
         Ridge::leave_one_out()
