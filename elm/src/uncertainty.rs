@@ -12,13 +12,16 @@
 //!   (Annals of Statistics 49(1), 2021), from exact leave-one-out residuals and the predictions of
 //!   the $n$ networks that each leave out one row, all in closed form. Assumes nothing of the noise
 //!   but that rows are exchangeable: of settings that were not chosen on the rows, an interval asked to
-//!   cover $1 - \alpha$ covers at least $1 - 2\alpha$, and about $1 - \alpha$ in practice.
+//!   cover $1 - \alpha$ covers at least $1 - 2\alpha$, and about $1 - \alpha$ in practice. Residuals are
+//!   studentised: the one of row $i$ counts relative to the deviation above, at that row by the fit without
+//!   it, and is scaled by the deviation of that fit at $x$. Intervals are therefore wider where the training
+//!   rows say little. The guarantee holds for any such scale that treats all rows alike.
 //!
 //! Outside the training rows neither knows how the function goes on. Both then add what it may change
 //! by between the edge of the data, where predictions are [held](crate::bounds), and the row: with
 //! $e_j$ the distance beyond the range of input $j$ and $g_j$ the slope of the network along it, at
 //! the edge or as a root mean square over the training rows, whichever is steeper, $r = (\sum_j g_j^2 e_j^2)^{1/2}$ as one more independent
-//! deviation, and $4r$ at either end of an interval. That is an assumption, that the function is no
+//! deviation, and $6r$ at either end of an interval. That is an assumption, that the function is no
 //! steeper outside than inside, and not a guarantee.
 //!
 //! Both take the random layer, its standardisation and $\lambda$ as given. Where these were chosen on
@@ -77,6 +80,9 @@ pub struct UncertainElm<A: Scalar> {
     members: Vec<Member<A>>,
     /// Leave-one-out residuals of the mean, shape (rows, outputs).
     left_out: Array2<A>,
+    /// Their sizes over the deviation of a new observation there, in units of the noise, by the fit
+    /// without the row.
+    scores: Array2<A>,
     /// Estimated standard deviation of the noise, per output.
     noise: Array1<A>,
     /// Mean square slope of each output along each input of the layer over the training rows, shape
@@ -91,6 +97,17 @@ struct Member<A: Scalar> {
     validator: Validator<A>,
     /// Leave-one-out residuals, shape (rows, outputs).
     left_out: Array2<A>,
+    /// One minus the leverage of each row, shape (rows, outputs).
+    freedom: Array2<A>,
+}
+
+impl<A: Scalar> Member<A> {
+    /// What the posterior adds to the variance of a new observation, in units of the noise's, shape
+    /// (rows, outputs); `hidden` is this member's hidden-layer matrix.
+    fn spread(&self, hidden: &Array2<A>) -> Array2<A> {
+        let lambda = &self.model.diagnosis().lambda;
+        self.validator.posterior_spread(hidden, lambda)
+    }
 }
 
 impl<A: Scalar> ElmParams<A> {
@@ -190,10 +207,15 @@ impl<A: Scalar> CheckedParams<A> {
             .leave_one_out(&model.diagnosis().lambda)?
             .residuals()
             .to_owned();
+        // At a training row the posterior's share of the variance is the leverage.
+        let freedom = validator
+            .posterior_spread(&hidden, &model.diagnosis().lambda)
+            .mapv_into(|leverage| (A::one() - leverage).max(A::epsilon()));
         Ok(Member {
             model,
             validator,
             left_out,
+            freedom,
         })
     }
 }
@@ -203,9 +225,15 @@ impl<A: Scalar> UncertainElm<A> {
         let models: Vec<&Elm<A>> = members.iter().map(|member| &member.model).collect();
         let share = A::from_f64(members.len() as f64).recip();
         let mut left_out = Array2::zeros(t.dim());
+        let mut variances = Array2::ones(t.dim());
         for member in &members {
             left_out.scaled_add(share, &member.left_out);
+            // Of the fit without the row: h / (1 - h).
+            variances.zip_mut_with(&member.freedom, |v: &mut A, &f| *v += share * (f.recip() - A::one()));
         }
+        let scores = Zip::from(&left_out)
+            .and(&variances)
+            .map_collect(|e, v| e.abs() / v.sqrt());
         let mut model = Elm::mean(&models);
         let residuals = &t - &model.predict(x)?;
         if members.len() > 1 {
@@ -224,6 +252,7 @@ impl<A: Scalar> UncertainElm<A> {
             model,
             members,
             left_out,
+            scores,
             noise,
         })
     }
@@ -321,13 +350,9 @@ impl<A: Scalar> UncertainElm<A> {
     pub fn predict_deviation(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
         let share = A::from_f64(self.members.len() as f64).recip();
         let mut spread = Array2::zeros((x.nrows(), self.model.outputs()));
-        for Member {
-            model, validator, ..
-        } in &self.members
-        {
-            let hidden = model.hidden_matrix(x)?;
-            let own = validator.posterior_spread(&hidden, &model.diagnosis().lambda);
-            spread.scaled_add(share, &own);
+        for member in &self.members {
+            let hidden = member.model.hidden_matrix(x)?;
+            spread.scaled_add(share, &member.spread(&hidden));
         }
         let mut deviation = spread.mapv_into(|s| (A::one() + s).sqrt()) * &self.noise;
         deviation.zip_mut_with(&self.change_outside(x), |d, &change| *d = d.hypot(change));
@@ -371,22 +396,37 @@ impl<A: Scalar> UncertainElm<A> {
         }
         let share = A::from_f64(self.members.len() as f64).recip();
         let change = self.change_outside(x);
+        let mut spread = Array2::ones(predicted.dim());
+        for (member, hidden) in self.members.iter().zip(&hidden) {
+            spread.scaled_add(share, &member.spread(hidden));
+        }
         let mut ends = vec![A::zero(); rows];
-        for (output, left_out) in self.left_out.columns().into_iter().enumerate() {
+        for (output, scores) in self.scores.columns().into_iter().enumerate() {
             for row in 0..x.nrows() {
-                // How far the prediction here moves when each row is left out.
+                // How far the prediction here moves when each row is left out, and its variance then.
                 let mut moves = Array1::zeros(rows);
+                let mut halves: Array1<A> = Array1::from_elem(rows, spread[[row, output]]);
                 for (member, hidden) in self.members.iter().zip(&hidden) {
                     let lambda = member.model.diagnosis().lambda[output];
                     let here = hidden.slice(s![row..=row, ..]);
                     let pull = member.validator.pull(&here, lambda);
-                    moves.scaled_add(share, &(pull * member.left_out.column(output)));
+                    Zip::from(&mut moves)
+                        .and(&mut halves)
+                        .and(&pull)
+                        .and(member.left_out.column(output))
+                        .and(member.freedom.column(output))
+                        .for_each(|moved, variance, &pull, &left_out, &freedom| {
+                            *moved += share * pull * left_out;
+                            *variance += share * pull * pull / freedom;
+                        });
                 }
+                halves.mapv_inplace(A::sqrt);
+                halves *= &scores;
                 let centre = predicted[[row, output]];
-                let wider = A::from_f64(4.0) * change[[row, output]];
+                let wider = A::from_f64(6.0) * change[[row, output]];
                 let mut end = |sign: A| {
-                    for ((end, &e), &moved) in ends.iter_mut().zip(left_out).zip(&moves) {
-                        *end = sign * (centre - moved) - e.abs();
+                    for ((end, &half), &moved) in ends.iter_mut().zip(&halves).zip(&moves) {
+                        *end = sign * (centre - moved) - half;
                     }
                     let (_, value, _) = ends.select_nth_unstable_by(outside - 1, |a, b| {
                         a.as_f64().total_cmp(&b.as_f64())

@@ -57,7 +57,8 @@ fn the_deviation_is_that_of_the_ridge_posterior() {
 
 #[test]
 fn intervals_are_those_of_refitting_without_each_row() {
-    // Jackknife+ by its definition, at the same layer, scaling and absolute lambda.
+    // Jackknife+ of studentised residuals by its definition, at the same layer, scaling and absolute
+    // lambda: the deviation is that of the fit without the row.
     let (x, t) = problem(24, 0.2, 3);
     let fitted = params()
         .solver(Ridge::relative(1e-3))
@@ -81,9 +82,20 @@ fn intervals_are_those_of_refitting_without_each_row() {
             .unwrap();
         let at =
             |h: ndarray::ArrayView1<'_, f64>| h.dot(&refit.beta.column(0)) + refit.intercept[0];
+        let deviation = |row: ndarray::ArrayView1<'_, f64>| {
+            let mean = h_rest.mean_axis(Axis(0)).unwrap();
+            let centred = &h_rest - &mean;
+            let gram = centred.t().dot(&centred) + Array2::<f64>::eye(h.ncols()) * absolute;
+            let row = (&row - &mean).insert_axis(Axis(1));
+            let problem = LeastSquares::new(&gram, &row).unwrap();
+            let solution = Solver::from(PseudoInverse::default()).solve(&problem);
+            let spread = row.column(0).dot(&solution.unwrap().beta.column(0));
+            (1.0 + 1.0 / h_rest.nrows() as f64 + spread).sqrt()
+        };
         let residual = (t[left_out] - at(h.row(left_out))).abs();
-        lower.push(at(h_new.row(0)) - residual);
-        upper.push(at(h_new.row(0)) + residual);
+        let scale = deviation(h_new.row(0)) / deviation(h.row(left_out));
+        lower.push(at(h_new.row(0)) - residual * scale);
+        upper.push(at(h_new.row(0)) + residual * scale);
     }
     lower.sort_by(f64::total_cmp);
     upper.sort_by(f64::total_cmp);
