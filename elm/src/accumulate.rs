@@ -45,15 +45,16 @@ use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2, Axis
 use serde::{Deserialize, Serialize};
 
 use crate::bounds::Bounds;
+use crate::check::{check_length, check_matrix, check_weights};
 use crate::error::{Error, Result};
 use crate::hidden::HiddenLayer;
 use crate::linalg::Triangular;
+use crate::memory::check_room;
 use crate::model::{CheckedParams, Targets};
 use crate::network::{Elm, design};
-use crate::room::check_room;
 use crate::scalar::{Scalar, power_of_two};
 use crate::scaler::Scaler;
-use crate::solve::{Solver, check_length, check_matrix, check_weights};
+use crate::solve::Solver;
 
 /// Rows in, a triangle kept; see the [module](self).
 ///

@@ -18,10 +18,10 @@
 use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis, Zip};
 use serde::{Deserialize, Serialize};
 
+use crate::check::{check_length, check_matrix};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
-use crate::solve::{check_length, check_matrix};
 
 /// What a prediction may exceed the range of the training targets by, on either side, as a share of
 /// that range: rows between the training rows may well be higher than all of them.

@@ -13,9 +13,9 @@
 
 use ndarray::{Array1, ArrayRef1, ArrayView1, ArrayView2, Axis};
 
+use crate::check::check_length;
 use crate::error::{Error, Result};
 use crate::scalar::{Scalar, power_of_two};
-use crate::solve::check_length;
 use crate::stats::{Sum, sum};
 
 /// Root mean squared error.

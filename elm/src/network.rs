@@ -4,15 +4,16 @@ use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
 use crate::bounds::Bounds;
+use crate::check::{check_length, check_matrix};
 use crate::error::{Error, Result};
 use crate::hidden::HiddenLayer;
+use crate::memory::check_room;
 use crate::metrics::root_mean_squares;
 use crate::predictor::Predictor;
-use crate::room::check_room;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
-use crate::solve::spectrum::norm;
-use crate::solve::{Diagnosis, Reason, Solution, check_length, check_matrix};
+use crate::solve::norms::norm;
+use crate::solve::{Diagnosis, Reason, Solution};
 
 /// Project, activate, and append the inputs where they are linked directly.
 pub(crate) fn design<A: Scalar>(

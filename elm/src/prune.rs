@@ -62,12 +62,13 @@ use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, concatenate, s};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::linalg::{Kernel, Symmetric, Triangular};
+use crate::linalg::{Kernel, Triangular};
 use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::solve::frame::{Frame, Prepared};
 use crate::solve::lanczos::largest_eigenvalue;
 use crate::solve::spectrum::Spectrum;
+use crate::solve::symmetric::Symmetric;
 use crate::solve::{Lambda, LeastSquares, Ridge};
 
 /// How much of a layer stays.

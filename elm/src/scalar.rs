@@ -5,8 +5,8 @@ use std::iter::Sum;
 use ndarray::{ArrayView, CowArray, Dimension, NdFloat};
 use serde::{Serialize, de::DeserializeOwned};
 
-use crate::activation::Coefficients;
 use crate::linalg::Kernel;
+use crate::simd::Coefficients;
 
 /// `f32` or `f64`. Sealed: the linear algebra and the vector code behind it exist for these
 /// two.

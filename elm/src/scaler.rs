@@ -5,9 +5,9 @@ use std::marker::PhantomData;
 use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2, Axis, Zip};
 use serde::{Deserialize, Serialize};
 
+use crate::check::{check_length, check_matrix, check_some_weight, check_weights};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
-use crate::solve::{check_length, check_matrix, check_some_weight, check_weights};
 use crate::stats::Moments;
 
 /// Subtracts each input's mean and divides by its standard deviation (with divisor $n$).

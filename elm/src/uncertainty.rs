@@ -229,7 +229,9 @@ impl<A: Scalar> UncertainElm<A> {
         for member in &members {
             left_out.scaled_add(share, &member.left_out);
             // Of the fit without the row: h / (1 - h).
-            variances.zip_mut_with(&member.freedom, |v: &mut A, &f| *v += share * (f.recip() - A::one()));
+            variances.zip_mut_with(&member.freedom, |v: &mut A, &f| {
+                *v += share * (f.recip() - A::one())
+            });
         }
         let scores = Zip::from(&left_out)
             .and(&variances)

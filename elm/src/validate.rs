@@ -47,12 +47,13 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
+use crate::check::check_length;
 use crate::error::{Error, Result};
-use crate::room::check_room;
+use crate::memory::check_room;
 use crate::scalar::Scalar;
 use crate::solve::ridge::answer;
 use crate::solve::spectrum::{RowSpectrum, Spectrum};
-use crate::solve::{LeastSquares, Reason, Ridge, Solution, check_length, in_range};
+use crate::solve::{LeastSquares, Reason, Ridge, Solution, in_range};
 pub use fits::FoldFit;
 use fold::Fold;
 pub use held_out::{HeldOut, Path};

@@ -5,14 +5,14 @@ use ndarray::{Array2, Axis, concatenate};
 use rayon::prelude::*;
 
 use super::Accumulator;
+use crate::check::check_matrix;
 use crate::error::{Error, Result};
+#[cfg(feature = "rayon")]
+use crate::memory::check_room;
 use crate::model::CheckedParams;
 use crate::network::Elm;
-#[cfg(feature = "rayon")]
-use crate::room::check_room;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
-use crate::solve::check_matrix;
 
 const NO_CHUNKS: Error = Error::Empty {
     what: "chunks",

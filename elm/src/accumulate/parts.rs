@@ -5,12 +5,13 @@ use serde::Deserialize;
 
 use super::{Accumulator, BLOCK, OVERFLOW};
 use crate::bounds::Bounds;
+use crate::check::{check_length, check_matrix};
 use crate::error::{Error, Result};
 use crate::hidden::HiddenLayer;
 use crate::network::check_layer;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
-use crate::solve::{Solver, check_length, check_matrix};
+use crate::solve::Solver;
 
 /// The fields of [`Accumulator`].
 #[derive(Deserialize)]

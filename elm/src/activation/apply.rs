@@ -2,9 +2,9 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::{Accuracy, Activation, Coefficients, formulas};
+use super::{Accuracy, Activation, formulas};
 use crate::scalar::Scalar;
-use crate::simd::{Lanes, Level};
+use crate::simd::{Coefficients, Lanes, Level};
 
 /// One of [`formulas`] as a type: called through a closure or a function pointer it would be
 /// compiled without the vector unit.

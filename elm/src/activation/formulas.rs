@@ -11,8 +11,7 @@
 
 use pulp::Simd;
 
-use super::coefficients::Coefficients;
-use crate::simd::Lanes;
+use crate::simd::{Coefficients, Lanes};
 
 /// $c = r \coth(r/2)$.
 #[inline(always)]

@@ -1,7 +1,6 @@
 //! Activation functions: the $f$ of equation 7, applied to every entry of $XW + b$.
 
 mod apply;
-mod coefficients;
 mod formulas;
 #[cfg(test)]
 mod tests_vector;
@@ -16,8 +15,6 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use crate::error::Error;
 use crate::scalar::Scalar;
 use crate::simd::Level;
-
-pub use coefficients::Coefficients;
 
 /// The function that a hidden neuron applies to its weighted sum $z = w \cdot x + b$.
 ///

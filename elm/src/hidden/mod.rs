@@ -13,9 +13,9 @@ use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut2, Axis, s};
 use serde::{Deserialize, Serialize};
 
 use crate::activation::Activation;
+use crate::check::{check_length, check_matrix};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
-use crate::solve::{check_length, check_matrix};
 
 pub use draw::{Biases, Distribution, Kind, Neurons};
 pub(crate) use draw::{Inputs, Plan};

@@ -8,17 +8,12 @@
 mod faer;
 #[cfg(feature = "openblas-system")]
 mod lapack;
-mod symmetric;
 
 #[cfg(not(any(feature = "faer", feature = "openblas-system")))]
 compile_error!("elm-learn needs a linear algebra back end: feature `faer` or `openblas-system`");
 
 use ndarray::{Array1, Array2, ArrayView2, ShapeBuilder};
 use num_traits::Zero;
-
-use crate::scalar::Scalar;
-
-pub(crate) use symmetric::Symmetric;
 
 /// The linear algebra back end that this build uses, `"faer"` or `"openblas"`.
 #[must_use]
@@ -52,18 +47,6 @@ pub struct Triangular<A> {
     /// For each column of $B$, the sum of squares of the part that no combination of $A$'s
     /// columns reaches.
     pub unreached: Array1<A>,
-}
-
-impl<A: Scalar> Triangular<A> {
-    /// In another type.
-    pub(crate) fn narrow<B: Scalar>(self) -> Triangular<B> {
-        let value = |value: A| B::from_f64(value.as_f64());
-        Triangular {
-            r: self.r.mapv_into_any(value),
-            qtb: self.qtb.mapv_into_any(value),
-            unreached: self.unreached.mapv_into_any(value),
-        }
-    }
 }
 
 /// The answer of a symmetric positive definite system.
@@ -142,6 +125,7 @@ pub trait Kernel: Sized {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scalar::Scalar;
     use approx::{assert_abs_diff_eq, assert_relative_eq};
     use ndarray::{Array, Axis, array};
     use ndarray_rand::RandomExt;

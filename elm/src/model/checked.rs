@@ -4,15 +4,16 @@ use ndarray::{Array2, ArrayRef2, ArrayView1, ArrayView2};
 
 use super::{ElmParams, Rows, Targets};
 use crate::bounds::Bounds;
+use crate::check::{check_length, check_matrix};
 use crate::error::{Error, Result};
 use crate::hidden::{HiddenLayer, Inputs, Neurons};
+use crate::memory::{check_copies, check_room};
 use crate::network::{Elm, design};
 use crate::predictor::LayerRows;
-use crate::room::{check_copies, check_room};
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
 use crate::solve::moments::{HiddenRows, RowSource};
-use crate::solve::{LeastSquares, Solver, check_length, check_matrix};
+use crate::solve::{LeastSquares, Solver};
 use crate::validate::{FoldFit, HeldOut, Validator};
 
 /// Settings that are in range; made by [`ElmParams::check`].

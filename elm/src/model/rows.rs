@@ -2,9 +2,9 @@
 
 use ndarray::{ArrayView1, ArrayView2, Axis, CowArray, Ix1, Ix2};
 
+use crate::check::{check_length, check_matrix, check_some_weight, present};
 use crate::error::Result;
 use crate::scalar::Scalar;
-use crate::solve::{check_length, check_matrix, check_some_weight, present};
 
 /// Checked training rows and their weights, all of them positive. A row of weight 0 is no row: what
 /// is measured on inputs, drawn from them or fitted to them does not see it.

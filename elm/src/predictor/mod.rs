@@ -13,13 +13,13 @@ mod tests;
 use ndarray::{Array2, ArrayRef2, ArrayView2, ArrayViewMut2, Axis, aview_mut1, aview1};
 
 use crate::activation::Accuracy;
+use crate::check::check_length;
 use crate::error::{Error, Result};
+use crate::memory::check_room;
 use crate::network::Elm;
-use crate::room::check_room;
 use crate::scalar::Scalar;
 use crate::scaler::Scaler;
 use crate::simd::{Aligned, Level, zeros};
-use crate::solve::check_length;
 use kernels::{Accumulate, Project, row_blocks, sum_of_line};
 use packed::{CHUNK_PANELS, Packed, Panels};
 

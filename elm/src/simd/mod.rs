@@ -11,6 +11,7 @@
 //! Registers must not pass through closures: those are compiled without the vector unit, and each
 //! operation in them becomes a call. Hence plain loops, and `inline(always)` throughout.
 
+mod coefficients;
 mod lanes;
 mod real;
 
@@ -19,6 +20,7 @@ use std::fmt;
 use aligned_vec::{AVec, ConstAlign};
 use pulp::{Arch, Simd, WithSimd};
 
+pub(crate) use coefficients::Coefficients;
 pub(crate) use lanes::Lanes;
 pub(crate) use real::Real;
 

@@ -3,8 +3,8 @@
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
-use super::check_length;
-use super::spectrum::norm;
+use super::norms::norm;
+use crate::check::check_length;
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 

@@ -16,9 +16,10 @@ use super::diagnosis::{Diagnosis, Reason, Route};
 use super::frame::{Frame, Prepared};
 use super::lanczos::largest_eigenvalue;
 use super::moments::{Moments, RowSource};
-use super::spectrum::norm;
+use super::norms::norm;
+use super::symmetric::Symmetric;
 use crate::error::Result;
-use crate::linalg::{Positive, Symmetric};
+use crate::linalg::Positive;
 use crate::scalar::Scalar;
 
 /// The relative error that output weights may have by this route.

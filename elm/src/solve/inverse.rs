@@ -4,7 +4,7 @@ use ndarray::Array1;
 use serde::{Deserialize, Serialize};
 
 use super::frame::Prepared;
-use super::spectrum::{norm, rounding};
+use super::norms::{norm, rounding};
 use super::{Diagnosis, LeastSquares, Reason, Route, Solution};
 use crate::error::{Error, Result};
 use crate::linalg::Failure;

@@ -4,7 +4,7 @@ use ndarray::{Array1, ArrayView2};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::linalg::Symmetric;
+use super::symmetric::Symmetric;
 use crate::scalar::Scalar;
 
 /// The largest eigenvalue of a symmetric matrix without negative ones, to 1e-10 of itself (32

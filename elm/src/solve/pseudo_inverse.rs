@@ -6,11 +6,13 @@ use serde::{Deserialize, Serialize};
 use super::frame::{Frame, Prepared};
 use super::lanczos::largest_eigenvalue;
 use super::moments::RowSource;
-use super::spectrum::{Spectrum, norm, rounding};
+use super::norms::{norm, rounding};
+use super::spectrum::Spectrum;
+use super::symmetric::Symmetric;
 use super::tiles::{self, Tiles};
 use super::{Diagnosis, LeastSquares, Reason, Route, Solution};
 use crate::error::{Error, Result};
-use crate::linalg::{Symmetric, Triangular};
+use crate::linalg::Triangular;
 use crate::scalar::Scalar;
 
 /// The least-squares solution of minimum norm.

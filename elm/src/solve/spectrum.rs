@@ -10,6 +10,7 @@
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
 
 use super::frame::{Frame, Prepared};
+use super::norms::{norm, rounding};
 use super::{Diagnosis, LeastSquares, Reason, Route, Solution};
 use crate::error::Result;
 use crate::linalg::{Svd, Triangular};
@@ -366,14 +367,6 @@ impl<A: Scalar> RowSpectrum<A> {
     }
 }
 
-/// The level below which a singular value of a matrix of this size is rounding error, relative to
-/// the largest one.
-pub(crate) fn rounding<A: Scalar>(rows: usize, columns: usize) -> A {
-    // The backward error of the factorisations grows like the root of the size in practice; the
-    // usual bound eps * max(rows, columns) would cut at 0.01 for 100,000 rows of f32.
-    A::epsilon() * A::from_f64(4.0 * (rows.max(columns) as f64).sqrt())
-}
-
 /// Drops the directions whose singular values are rounding error. Their left singular vectors are
 /// arbitrary, and may lean into the direction of the intercept or of the true residual.
 fn truncate<A: Scalar>(svd: Svd<A>, rows: usize) -> Svd<A> {
@@ -403,18 +396,4 @@ fn share<A: Scalar>(a: A, b: A) -> A {
 /// Sum of squares of each column.
 fn squares<A: Scalar>(matrix: ArrayView2<'_, A>) -> Array1<A> {
     matrix.map_axis(Axis(0), |column| column.dot(&column))
-}
-
-/// Euclidean norm, in range wherever the result is.
-pub(crate) fn norm<A: Scalar>(column: ArrayView1<'_, A>) -> f64 {
-    let largest = column.iter().fold(0.0_f64, |m, v| m.max(v.as_f64().abs()));
-    if largest == 0.0 {
-        return 0.0;
-    }
-    largest
-        * column
-            .iter()
-            .map(|v| (v.as_f64() / largest).powi(2))
-            .sum::<f64>()
-            .sqrt()
 }

@@ -462,3 +462,15 @@ pub(super) fn magnitudes<A: Scalar>(matrix: ArrayView2<'_, A>, roots: &Array1<f6
     }
     largest
 }
+
+impl<A: Scalar> Triangular<A> {
+    /// In another type.
+    pub(super) fn narrow<B: Scalar>(self) -> Triangular<B> {
+        let value = |value: A| B::from_f64(value.as_f64());
+        Triangular {
+            r: self.r.mapv_into_any(value),
+            qtb: self.qtb.mapv_into_any(value),
+            unreached: self.unreached.mapv_into_any(value),
+        }
+    }
+}

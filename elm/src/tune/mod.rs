@@ -51,12 +51,13 @@ use ndarray::ArrayRef2;
 use serde::{Deserialize, Serialize};
 
 use crate::activation::Activation;
+use crate::check::{check_length, check_matrix};
 use crate::error::{Error, Result};
 use crate::hidden::Biases;
 use crate::model::{ElmParams, Targets};
 use crate::network::Elm;
 use crate::scalar::Scalar;
-use crate::solve::{Ridge, check_length, check_matrix};
+use crate::solve::Ridge;
 use search::Search;
 
 /// The held-out error that a [`Tuner`] makes small.

@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use ndarray::{Array1, Array2, Axis, s};
 
 use super::Validator;
+use crate::check::check_length;
 use crate::error::{Error, Result};
 use crate::linalg::{Positive, Triangular};
 use crate::scalar::Scalar;
-use crate::solve::check_length;
-use crate::solve::spectrum::rounding;
+use crate::solve::norms::rounding;
 
 /// Rows that are left out together.
 #[derive(Debug, Clone)]

@@ -1,7 +1,7 @@
 //! Constants of the vectorised activation functions. Polynomials are minimax: their largest error
 //! over the interval is the smallest possible (Remez's exchange algorithm in 60 digits).
 
-use crate::simd::Real;
+use super::real::Real;
 
 /// The constants for `f32` and `f64`.
 ///
