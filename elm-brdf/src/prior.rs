@@ -24,7 +24,9 @@ mod design;
 use elm::persist::Persist;
 use elm::solve::{LeastSquares, Ridge, Solver};
 use elm::validate::Validator;
-use elm::{Activation, Biases, Distribution, Elm, ElmParams, Neurons, Scaler};
+use elm::{
+    Activation, Biases, Distribution, Elm, ElmParams, FeatureMap, FeatureMapParams, Neurons, Scaler,
+};
 use ndarray::{Array1, Array2, ArrayView2, Axis, concatenate};
 use serde::{Deserialize, Serialize};
 
@@ -34,7 +36,7 @@ use crate::features::Features;
 use crate::geometry::Pair;
 use crate::link::Link;
 use crate::metrics::Metrics;
-use crate::model::{BrdfModel, Draw, Layer, without_weights};
+use crate::model::{BrdfModel, Draw, Layer};
 
 /// How a [`Prior`] is built.
 ///
@@ -88,8 +90,8 @@ impl Default for PriorParams {
 #[serde(try_from = "File", into = "File")]
 pub struct Prior {
     features: Features,
-    params: ElmParams<f64>,
-    layer: Elm<f64>,
+    params: FeatureMapParams<f64>,
+    map: FeatureMap<f64>,
     mean: Weights<Array1<f64>>,
     /// $B$, one column for each material.
     deviations: Weights<Array2<f64>>,
@@ -107,7 +109,7 @@ struct Weights<A> {
 struct File {
     source: String,
     features: Features,
-    params: ElmParams<f64>,
+    params: FeatureMapParams<f64>,
     scaler: Option<Scaler<f64>>,
     mean: Weights<Array1<f64>>,
     deviations: Weights<Array2<f64>>,
@@ -136,17 +138,16 @@ impl PriorParams {
         }
         let x = self.features.compute_training(pairs);
         let scaler = Scaler::measured(&x)?;
-        let params = self.params(x.ncols());
-        let hidden = params.clone().check()?.hidden_layer(x.ncols())?;
-        let layer = without_weights(&scaler, hidden)?;
-        let h = layer.hidden_matrix(&x)?;
+        let params = self.params(x.ncols()).feature_map().clone();
+        let map = FeatureMap::new(Some(scaler), params.draw(x.ncols())?, false)?;
+        let h = map.transform(&x)?;
         let targets = Link::default_log().fit(values)?.to_targets(values)?;
         let problem = LeastSquares::new(&h, &targets)?.intercept(true);
         let solution = Solver::from(Ridge::relative(SMOOTHING)).solve(&problem)?;
         let mut prior = Prior {
             features: self.features,
             params,
-            layer,
+            map,
             mean: Weights {
                 beta: Array1::zeros(0),
                 constant: Array1::zeros(1),
@@ -272,7 +273,7 @@ impl Prior {
     ) -> Result<BrdfModel> {
         check(pairs, values)?;
         let x = self.features.compute(pairs);
-        let h = self.layer.hidden_matrix(&x)?;
+        let h = self.map.transform(&x)?;
         let link = Link::default_log().fit(values)?;
         let targets = link.to_targets(values)?;
         let level = h.dot(&self.mean.beta) + self.mean.constant[0];
@@ -317,8 +318,7 @@ impl Prior {
             intercept.scaled_add(share, &self.deviations.constant.dot(&z));
             intercept.scaled_add(share, &solution.intercept);
         }
-        let hidden = self.layer.hidden().clone();
-        let network = Elm::from_parts(self.layer.scaler().cloned(), hidden, beta, intercept)?;
+        let network = Elm::from_parts(self.map.clone(), beta, intercept)?;
         let layer = Layer::Drawn(vec![Draw {
             params: self.params.clone(),
             kept: None,
@@ -346,7 +346,7 @@ impl From<Prior> for File {
             source: prior.source,
             features: prior.features,
             params: prior.params,
-            scaler: prior.layer.scaler().cloned(),
+            scaler: prior.map.scaler().cloned(),
             mean: prior.mean,
             deviations: prior.deviations,
         }
@@ -393,13 +393,11 @@ impl TryFrom<File> for Prior {
                 column: 0,
             }));
         }
-        let hidden = file.params.clone().check()?.hidden_layer(inputs)?;
-        let beta = Array2::zeros((neurons, 1));
-        let layer = Elm::from_parts(file.scaler, hidden, beta, Array1::zeros(1))?;
+        let map = FeatureMap::new(file.scaler, file.params.draw(inputs)?, false)?;
         Ok(Self {
             features: file.features,
             params: file.params,
-            layer,
+            map,
             mean: file.mean,
             deviations: file.deviations,
             source: file.source,
@@ -410,4 +408,5 @@ impl TryFrom<File> for Prior {
 impl Persist for Prior {
     const KIND: &'static str = "elm-brdf prior";
     const SCALAR: &'static str = "f64";
+    const VERSION: u32 = 3;
 }

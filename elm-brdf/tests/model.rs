@@ -157,7 +157,7 @@ fn below_either_horizon_a_model_is_black() {
     }
 }
 
-/// Models of every kind of layer: averaged, of one draw, pruned, given, and laid on rows.
+/// Models of every kind of layer: averaged, of one draw, pruned, given, laid on rows, with direct links.
 fn kinds() -> Vec<BrdfModel> {
     let (pairs, values) = measured(12);
     let paint = paint::samples(3200, 1).unwrap();
@@ -180,7 +180,10 @@ fn kinds() -> Vec<BrdfModel> {
         params(plain.clone())
             .fit_model(&pairs, values.view())
             .unwrap(),
-        params(plain.biases(elm::Biases::OnData))
+        params(plain.clone().biases(elm::Biases::OnData))
+            .fit_model(&pairs, values.view())
+            .unwrap(),
+        params(plain.direct_links(true))
             .fit_model(&pairs, values.view())
             .unwrap(),
     ]
@@ -204,7 +207,7 @@ fn models_come_back_from_files_of_both_forms_bit_for_bit() {
 
 #[test]
 fn stored_numbers_are_those_that_the_file_holds() {
-    let [averaged, single, pruned, given, on_rows] = kinds().try_into().unwrap();
+    let [averaged, single, pruned, given, on_rows, linked] = kinds().try_into().unwrap();
     // Weights; for each input its mean, its factor and a scale in each draw; constant, offset and
     // ceiling. As many as were measured.
     let (neurons, inputs) = (
@@ -227,6 +230,8 @@ fn stored_numbers_are_those_that_the_file_holds() {
     assert_eq!(given.stored_floats(), (20 + 2) * 3 + 10);
     // The layer itself too.
     assert_eq!(on_rows.stored_floats(), given.stored_floats() + 20 * 6);
+    // An output weight more for each input and channel.
+    assert_eq!(linked.stored_floats(), given.stored_floats() + 5 * 3);
     let bytes = persist::to_bytes(&pruned).unwrap();
     assert!(
         bytes.len() < 8 * pruned.stored_floats() + 1200,
@@ -302,12 +307,12 @@ fn damaged_and_lying_files_are_refused() {
     lie("\"sum-difference\"", "\"half-diff\"");
     lie("\"sum-difference\"", "\"no such inputs\"");
     // More neurons than there are weights, and more than memory holds.
-    let (_, rest) = json.split_once("\"neurons\": ").unwrap();
+    let (_, rest) = json.split_once("\"count\": ").unwrap();
     let digits = rest.split(|c: char| !c.is_ascii_digit()).next().unwrap();
     let count: usize = digits.parse().unwrap();
-    let neurons = format!("\"neurons\": {count}");
-    lie(&neurons, &format!("\"neurons\": {}", count + 1));
-    lie(&neurons, "\"neurons\": 18446744073709551615");
+    let neurons = format!("\"count\": {count}");
+    lie(&neurons, &format!("\"count\": {}", count + 1));
+    lie(&neurons, "\"count\": 18446744073709551615");
     lie("\"offset\": ", "\"offset\": -");
     lie("elm-brdf model", "elm model");
 }

@@ -47,13 +47,12 @@ use serde::{Deserialize, Serialize};
 use crate::bounds::Bounds;
 use crate::check::{check_length, check_matrix, check_weights};
 use crate::error::{Error, Result};
-use crate::hidden::HiddenLayer;
+use crate::feature_map::{FeatureMap, HiddenLayer, Scaler};
 use crate::linalg::Triangular;
 use crate::memory::check_room;
 use crate::model::{CheckedParams, Targets};
-use crate::network::{Elm, design};
+use crate::network::Elm;
 use crate::scalar::{Scalar, power_of_two};
-use crate::scaler::Scaler;
 use crate::solve::Solver;
 
 /// Rows in, a triangle kept; see the [module](self).
@@ -83,9 +82,7 @@ use crate::solve::Solver;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "", try_from = "parts::Parts<A>")]
 pub struct Accumulator<A: Scalar> {
-    scaler: Option<Scaler<A>>,
-    hidden: HiddenLayer<A>,
-    direct_links: bool,
+    map: FeatureMap<A>,
     solver: Solver,
     intercept: bool,
     inputs: usize,
@@ -147,8 +144,14 @@ impl<A: Scalar> Accumulator<A> {
             });
         }
         check_length("columns of inputs", x.ncols(), scaler.mean().len())?;
-        let x = scaler.transform(x.view());
-        Self::new(params, Some(scaler), x.view(), outputs)
+        let map = params.params().feature_map();
+        let layer = map.draw_layer(x.view(), Some(&scaler), None)?;
+        let links = params.links_directly();
+        Self::new(
+            params,
+            FeatureMap::of_checked(Some(scaler), layer, links),
+            outputs,
+        )
     }
 
     /// Draws the random layer for rows like those of `x`, shape (rows, inputs): inputs are
@@ -165,20 +168,11 @@ impl<A: Scalar> Accumulator<A> {
         outputs: usize,
     ) -> Result<Self> {
         check_matrix("inputs", x.view())?;
-        let scaler = params
-            .standardises()
-            .then(|| Scaler::measure(x.view(), None));
-        let scaled = scaler.as_ref().map(|scaler| scaler.transform(x.view()));
-        let x = scaled.as_ref().map_or(x.view(), |scaled| scaled.view());
-        Self::new(params, scaler, x, outputs)
+        let map = params.params().feature_map();
+        Self::new(params, map.draw_weighted(x.view(), None)?, outputs)
     }
 
-    fn new(
-        params: &CheckedParams<A>,
-        scaler: Option<Scaler<A>>,
-        sample: ArrayView2<'_, A>,
-        outputs: usize,
-    ) -> Result<Self> {
+    fn new(params: &CheckedParams<A>, map: FeatureMap<A>, outputs: usize) -> Result<Self> {
         if outputs == 0 {
             return Err(Error::Parameter {
                 name: "outputs",
@@ -193,14 +187,10 @@ impl<A: Scalar> Accumulator<A> {
                 second: "an accumulator",
             });
         }
-        let hidden = params.layer(sample.into(), None)?;
-        let inputs = hidden.inputs();
-        let direct_links = params.links_directly();
-        let links = if direct_links { inputs } else { 0 };
+        let inputs = map.inputs();
         let intercept = params.has_intercept();
         let columns = usize::from(intercept)
-            .saturating_add(hidden.neurons())
-            .saturating_add(links)
+            .saturating_add(map.features())
             .saturating_add(outputs);
         // Where the triangle fits, so does the block of rows.
         check_room(
@@ -209,9 +199,7 @@ impl<A: Scalar> Accumulator<A> {
             columns.saturating_mul(BLOCK + 2),
         )?;
         Ok(Self {
-            scaler,
-            hidden,
-            direct_links,
+            map,
             solver: solver.without_rows(),
             intercept,
             inputs,
@@ -230,7 +218,7 @@ impl<A: Scalar> Accumulator<A> {
     }
 
     pub(crate) fn hidden(&self) -> &HiddenLayer<A> {
-        &self.hidden
+        self.map.layer()
     }
 
     /// Number of rows so far.
@@ -341,9 +329,7 @@ impl<A: Scalar> Accumulator<A> {
         for start in (0..x.nrows()).step_by(block) {
             let range = s![start..x.nrows().min(start + block), ..];
             let x = x.slice(range);
-            let scaled = self.scaler.as_ref().map(|scaler| scaler.transform(x));
-            let x = scaled.as_ref().map_or(x, |scaled| scaled.view());
-            let h = design(&self.hidden, self.direct_links, x);
+            let h = self.map.apply(x);
             check_matrix("hidden-layer matrix", h.view())?;
             for (row, (h, t)) in h.rows().into_iter().zip(t.slice(range).rows()).enumerate() {
                 let weight = weights.map_or(A::one(), |weights| weights[start + row]);
@@ -377,10 +363,13 @@ impl<A: Scalar> Accumulator<A> {
     /// settings of the solve.
     pub fn merge(&mut self, other: &Self) -> Result<()> {
         for (what, same) in [
-            ("random layers", self.hidden == other.hidden),
-            ("scalers of inputs", self.scaler == other.scaler),
+            ("random layers", self.map.layer() == other.map.layer()),
+            ("scalers of inputs", self.map.scaler() == other.map.scaler()),
             ("numbers of outputs", self.outputs == other.outputs),
-            ("direct links", self.direct_links == other.direct_links),
+            (
+                "direct links",
+                self.map.direct_links() == other.map.direct_links(),
+            ),
             ("intercepts", self.intercept == other.intercept),
             ("solvers", self.solver == other.solver),
             ("bounds of predictions", self.bounded == other.bounded),
@@ -420,13 +409,7 @@ impl<A: Scalar> Accumulator<A> {
         let mut all = self.clone();
         all.flush()?;
         let solution = all.solver.solve_spectrum(&all.spectrum()?)?;
-        Ok(Elm::assemble(
-            all.scaler,
-            all.hidden,
-            all.direct_links,
-            solution,
-            all.bounds,
-        ))
+        Ok(Elm::assemble(all.map, solution, all.bounds))
     }
 
     fn columns(&self) -> usize {

@@ -20,8 +20,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::check::{check_length, check_matrix};
 use crate::error::{Error, Result};
+use crate::feature_map::Scaler;
 use crate::scalar::Scalar;
-use crate::scaler::Scaler;
 
 /// What a prediction may exceed the range of the training targets by, on either side, as a share of
 /// that range: rows between the training rows may well be higher than all of them.

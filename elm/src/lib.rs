@@ -52,7 +52,7 @@ pub mod activation;
 pub mod bounds;
 mod check;
 mod error;
-mod hidden;
+mod feature_map;
 mod linalg;
 mod memory;
 pub mod metrics;
@@ -63,7 +63,6 @@ pub mod persist;
 mod predictor;
 pub mod prune;
 mod scalar;
-mod scaler;
 mod simd;
 pub mod solve;
 mod stats;
@@ -75,13 +74,15 @@ pub use accumulate::Accumulator;
 pub use activation::{Accuracy, Activation};
 pub use bounds::Bounds;
 pub use error::{Error, Result};
-pub use hidden::{Biases, Distribution, Group, HiddenLayer, Kind, Neurons};
+pub use feature_map::{
+    Biases, Distribution, FeatureMap, FeatureMapParams, Group, HiddenLayer, Kind, Neurons, Scaler,
+    ScalerBuilder,
+};
 pub use linalg::backend;
 pub use model::{CheckedParams, ElmParams, Targets};
 pub use network::Elm;
 pub use predictor::{Predictor, Scratch};
 pub use scalar::Scalar;
-pub use scaler::{Scaler, ScalerBuilder};
 pub use tune::Tuner;
 pub use uncertainty::UncertainElm;
 

@@ -6,30 +6,13 @@ use serde::{Deserialize, Serialize};
 use crate::bounds::Bounds;
 use crate::check::{check_length, check_matrix};
 use crate::error::{Error, Result};
-use crate::hidden::HiddenLayer;
+use crate::feature_map::{FeatureMap, HiddenLayer, Scaler};
 use crate::memory::check_room;
 use crate::metrics::root_mean_squares;
 use crate::predictor::Predictor;
 use crate::scalar::Scalar;
-use crate::scaler::Scaler;
 use crate::solve::norms::norm;
 use crate::solve::{Diagnosis, Reason, Solution};
-
-/// Project, activate, and append the inputs where they are linked directly.
-pub(crate) fn design<A: Scalar>(
-    hidden: &HiddenLayer<A>,
-    direct_links: bool,
-    x: ArrayView2<'_, A>,
-) -> Array2<A> {
-    let h = hidden.forward(x);
-    if !direct_links {
-        return h;
-    }
-    let mut both = Array2::zeros((x.nrows(), h.ncols() + x.ncols()));
-    both.slice_mut(ndarray::s![.., ..h.ncols()]).assign(&h);
-    both.slice_mut(ndarray::s![.., h.ncols()..]).assign(&x);
-    both
-}
 
 /// A fitted network: $o(x) = \sum_k \beta_k f(\omega_k \cdot x + b_k)$ (equation 7) plus, where
 /// set, an intercept and direct links. Made by [`ElmParams::fit`](crate::ElmParams::fit).
@@ -48,10 +31,8 @@ pub(crate) fn design<A: Scalar>(
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "", try_from = "Parts<A>")]
 pub struct Elm<A: Scalar> {
-    scaler: Option<Scaler<A>>,
-    hidden: HiddenLayer<A>,
-    direct_links: bool,
-    /// Shape (neurons, or neurons + inputs with direct links; outputs).
+    map: FeatureMap<A>,
+    /// Shape (features, outputs).
     beta: Array2<A>,
     intercept: Array1<A>,
     diagnosis: Diagnosis,
@@ -63,43 +44,27 @@ pub struct Elm<A: Scalar> {
 #[derive(Deserialize)]
 #[serde(bound = "")]
 struct Parts<A: Scalar> {
-    scaler: Option<Scaler<A>>,
-    hidden: HiddenLayer<A>,
-    direct_links: bool,
+    map: FeatureMap<A>,
     beta: Array2<A>,
     intercept: Array1<A>,
     diagnosis: Diagnosis,
     bounds: Option<Bounds<A>>,
 }
 
-/// Whether a layer and a scaler from outside are finite and fit each other.
-pub(crate) fn check_layer<A: Scalar>(
-    hidden: &HiddenLayer<A>,
-    scaler: Option<&Scaler<A>>,
-) -> Result<()> {
-    hidden.check()?;
-    match scaler {
-        Some(scaler) => check_length("inputs of the scaler", scaler.mean().len(), hidden.inputs()),
-        None => Ok(()),
-    }
-}
-
 impl<A: Scalar> Elm<A> {
-    /// A network of a given layer and output weights from elsewhere.
+    /// A network of a given feature map and output weights from elsewhere.
     ///
-    /// `beta` has shape (neurons, outputs) and `intercept` one entry per output. `scaler` is that
-    /// of the training rows, `None` for inputs that are taken as they are.
+    /// `beta` has shape (features, outputs) and `intercept` one entry per output.
     ///
     /// ```
     /// use elm::{Elm, ElmParams};
     /// use ndarray::array;
     ///
     /// let (x, t) = (array![[0.0], [1.0], [2.0], [3.0]], array![0.0, 1.0, 4.0, 9.0]);
-    /// let params = ElmParams::new(10).seed(7).check()?;
+    /// let params = ElmParams::new(10).seed(7);
     /// let fitted = params.fit(&x, &t)?;
     /// let again = Elm::from_parts(
-    ///     fitted.scaler().cloned(),
-    ///     params.hidden_layer(1)?,
+    ///     params.feature_map().draw_on(&x)?,
     ///     fitted.beta().to_owned(),
     ///     fitted.intercept().to_owned(),
     /// )?;
@@ -109,17 +74,10 @@ impl<A: Scalar> Elm<A> {
     ///
     /// # Errors
     /// [`Error::Shape`], [`Error::Empty`] and [`Error::NotFinite`] for parts that do not fit.
-    pub fn from_parts(
-        scaler: Option<Scaler<A>>,
-        hidden: HiddenLayer<A>,
-        beta: Array2<A>,
-        intercept: Array1<A>,
-    ) -> Result<Self> {
+    pub fn from_parts(map: FeatureMap<A>, beta: Array2<A>, intercept: Array1<A>) -> Result<Self> {
         let diagnosis = Diagnosis::of_given(beta.view());
         Self::try_from(Parts {
-            scaler,
-            hidden,
-            direct_links: false,
+            map,
             beta,
             intercept,
             diagnosis,
@@ -133,29 +91,22 @@ impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
 
     fn try_from(parts: Parts<A>) -> Result<Self> {
         let Parts {
-            scaler,
-            hidden,
-            direct_links,
+            map,
             beta,
             intercept,
             mut diagnosis,
             bounds,
         } = parts;
-        check_layer(&hidden, scaler.as_ref())?;
-        let (inputs, neurons) = hidden.weights().dim();
         check_matrix("output weights", beta.view())?;
-        let columns = neurons + if direct_links { inputs } else { 0 };
-        check_length("rows of output weights", beta.nrows(), columns)?;
+        check_length("rows of output weights", beta.nrows(), map.features())?;
         check_length("intercepts", intercept.len(), beta.ncols())?;
         check_matrix("intercepts", intercept.view().insert_axis(Axis(0)))?;
         diagnosis.check(beta.ncols())?;
         if let Some(bounds) = &bounds {
-            bounds.check(inputs, beta.ncols())?;
+            bounds.check(map.inputs(), beta.ncols())?;
         }
         Ok(Self {
-            scaler,
-            hidden,
-            direct_links,
+            map,
             beta,
             intercept,
             diagnosis,
@@ -166,9 +117,7 @@ impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
 
 impl<A: Scalar> Elm<A> {
     pub(crate) fn assemble(
-        scaler: Option<Scaler<A>>,
-        hidden: HiddenLayer<A>,
-        direct_links: bool,
+        map: FeatureMap<A>,
         solution: Solution<A>,
         bounds: Option<Bounds<A>>,
     ) -> Self {
@@ -178,9 +127,7 @@ impl<A: Scalar> Elm<A> {
             diagnosis,
         } = solution;
         Self {
-            scaler,
-            hidden,
-            direct_links,
+            map,
             beta,
             intercept,
             diagnosis,
@@ -198,10 +145,10 @@ impl<A: Scalar> Elm<A> {
         }
         let count = members.len() as f64;
         let share = A::from_f64(count).recip();
-        let layers: Vec<_> = members.iter().map(|member| &member.hidden).collect();
+        let layers: Vec<_> = members.iter().map(|member| member.hidden()).collect();
         let (hidden, order) = HiddenLayer::join(&layers);
         let neurons = order.len();
-        let links = first.beta.nrows() - first.hidden.neurons();
+        let links = first.beta.nrows() - first.hidden().neurons();
         let mut beta = Array2::zeros((neurons + links, first.outputs()));
         for (mut row, &(member, neuron)) in beta.rows_mut().into_iter().zip(&order) {
             row.assign(&members[member].beta.row(neuron).mapv(|b| b * share));
@@ -211,7 +158,7 @@ impl<A: Scalar> Elm<A> {
             intercept.scaled_add(share, &member.intercept);
             let own = member
                 .beta
-                .slice(ndarray::s![member.hidden.neurons().., ..]);
+                .slice(ndarray::s![member.hidden().neurons().., ..]);
             beta.slice_mut(ndarray::s![neurons.., ..])
                 .scaled_add(share, &own);
         }
@@ -235,10 +182,9 @@ impl<A: Scalar> Elm<A> {
             beta_norm: beta.columns().into_iter().map(norm).collect(),
             ..first.diagnosis.clone()
         };
+        let map = &first.map;
         Self {
-            scaler: first.scaler.clone(),
-            hidden,
-            direct_links: first.direct_links,
+            map: FeatureMap::of_checked(map.scaler().cloned(), hidden, map.direct_links()),
             beta,
             intercept,
             diagnosis,
@@ -282,38 +228,28 @@ impl<A: Scalar> Elm<A> {
         check_length("columns of inputs", x.ncols(), self.inputs())?;
         check_matrix("inputs", x.view())?;
         check_room("the hidden-layer matrix", x.nrows(), self.beta.nrows())?;
-        Ok(design(
-            &self.hidden,
-            self.direct_links,
-            self.layer_inputs(x).view(),
-        ))
+        Ok(self.map.apply(self.held_inputs(x).view()))
     }
 
-    /// Inputs as the layer takes them: held to their bounds, and standardised.
-    pub(crate) fn layer_inputs(&self, x: &ArrayRef2<A>) -> Array2<A> {
+    /// Inputs held to their bounds.
+    fn held_inputs(&self, x: &ArrayRef2<A>) -> Array2<A> {
         let mut x = x.to_owned();
         if let Some(bounds) = &self.bounds {
             bounds.hold_inputs(&mut x);
         }
-        match &self.scaler {
-            Some(scaler) => scaler.transform(x.view()),
-            None => x,
-        }
+        x
     }
 
     /// The slope of each output at each row along each input, as the network makes its inputs
     /// (standardised, where that is on): one matrix (rows, inputs) for each output.
     pub(crate) fn gradients(&self, x: &ArrayRef2<A>) -> impl Iterator<Item = Array2<A>> {
-        let neurons = self.hidden.neurons();
-        let x = self.layer_inputs(x);
-        self.beta.columns().into_iter().map(move |beta| {
-            let (own, links) = beta.split_at(Axis(0), neurons);
-            let mut gradient = self.hidden.gradient(x.view(), own);
-            if !links.is_empty() {
-                gradient += &links;
-            }
-            gradient
-        })
+        let held = self.held_inputs(x);
+        let x = match self.scaler() {
+            Some(scaler) => scaler.transform(held.view()),
+            None => held,
+        };
+        let columns = self.beta.columns().into_iter();
+        columns.map(move |beta| self.map.gradient(x.view(), beta))
     }
 
     /// The ranges of the training rows that predictions are held to; nothing for a network
@@ -363,13 +299,13 @@ impl<A: Scalar> Elm<A> {
         if x.nrows() > 0 {
             check_matrix("inputs", x.view())?;
         }
-        Ok(bounds.distance(x, self.scaler.as_ref()))
+        Ok(bounds.distance(x, self.scaler()))
     }
 
     /// Number of inputs.
     #[must_use]
     pub fn inputs(&self) -> usize {
-        self.hidden.inputs()
+        self.map.inputs()
     }
 
     /// Number of outputs.
@@ -378,16 +314,22 @@ impl<A: Scalar> Elm<A> {
         self.beta.ncols()
     }
 
-    /// The random hidden layer.
+    /// The random feature map.
+    #[must_use]
+    pub fn map(&self) -> &FeatureMap<A> {
+        &self.map
+    }
+
+    /// The random hidden layer of the [map](Self::map).
     #[must_use]
     pub fn hidden(&self) -> &HiddenLayer<A> {
-        &self.hidden
+        self.map.layer()
     }
 
     /// The standardisation of inputs, where it is on.
     #[must_use]
     pub fn scaler(&self) -> Option<&Scaler<A>> {
-        self.scaler.as_ref()
+        self.map.scaler()
     }
 
     /// The output weights $\beta$, shape (neurons, outputs); with direct links the inputs' rows

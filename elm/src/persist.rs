@@ -35,14 +35,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::accumulate::Accumulator;
 use crate::activation::Activation;
-use crate::hidden::{Group, HiddenLayer};
+use crate::feature_map::{Group, HiddenLayer};
 use crate::network::Elm;
 use crate::scalar::Scalar;
 
 pub use whole::replace;
-
-/// The version of the layout that this build writes and reads.
-pub const VERSION: u32 = 2;
 
 const MAGIC: &[u8; 8] = b"elmfile\n";
 /// The byte order mark of UTF-8.
@@ -150,6 +147,9 @@ pub trait Persist: Serialize + DeserializeOwned {
     const KIND: &'static str;
     /// The scalar type that the file names, at most 255 bytes.
     const SCALAR: &'static str;
+    /// The version of this kind's layout that is written and read: one more with every change of what
+    /// is serialised.
+    const VERSION: u32;
 
     /// Whether a file can hold all of it.
     ///
@@ -163,6 +163,7 @@ pub trait Persist: Serialize + DeserializeOwned {
 impl<A: Scalar> Persist for Elm<A> {
     const KIND: &'static str = "elm model";
     const SCALAR: &'static str = A::NAME;
+    const VERSION: u32 = 3;
 
     fn check(&self) -> Result<(), Error> {
         not_custom(self.hidden())
@@ -172,6 +173,7 @@ impl<A: Scalar> Persist for Elm<A> {
 impl<A: Scalar> Persist for Accumulator<A> {
     const KIND: &'static str = "elm accumulator";
     const SCALAR: &'static str = A::NAME;
+    const VERSION: u32 = 3;
 
     fn check(&self) -> Result<(), Error> {
         not_custom(self.hidden())
@@ -257,7 +259,7 @@ pub fn to_json<T: Persist>(value: &T) -> Result<String, Error> {
     value.check()?;
     let envelope = Envelope {
         format: T::KIND.to_owned(),
-        version: VERSION,
+        version: T::VERSION,
         scalar: T::SCALAR.to_owned(),
         contents: value,
     };
@@ -275,7 +277,7 @@ pub fn to_bytes<T: Persist>(value: &T) -> Result<Vec<u8>, Error> {
     let payload = postcard::to_stdvec(value).map_err(contents::<T>)?;
     let mut bytes = Vec::with_capacity(payload.len() + 64);
     bytes.extend(MAGIC);
-    bytes.extend(VERSION.to_le_bytes());
+    bytes.extend(T::VERSION.to_le_bytes());
     for name in [T::KIND, T::SCALAR] {
         bytes.push(u8::try_from(name.len()).unwrap_or(u8::MAX));
         bytes.extend(name.as_bytes());
@@ -358,18 +360,6 @@ fn from_binary<T: Persist>(bytes: &[u8]) -> Result<T, Error> {
 }
 
 fn check_head<T: Persist>(version: u32, kind: &str, scalar: &str) -> Result<(), Error> {
-    if version > VERSION {
-        return Err(Error::Future {
-            found: version,
-            supported: VERSION,
-        });
-    }
-    if version < VERSION {
-        return Err(Error::Past {
-            found: version,
-            supported: VERSION,
-        });
-    }
     if kind != T::KIND {
         return Err(Error::Kind {
             found: kind.to_owned(),
@@ -380,6 +370,18 @@ fn check_head<T: Persist>(version: u32, kind: &str, scalar: &str) -> Result<(), 
         return Err(Error::ScalarType {
             found: scalar.to_owned(),
             expected: T::SCALAR,
+        });
+    }
+    if version > T::VERSION {
+        return Err(Error::Future {
+            found: version,
+            supported: T::VERSION,
+        });
+    }
+    if version < T::VERSION {
+        return Err(Error::Past {
+            found: version,
+            supported: T::VERSION,
         });
     }
     Ok(())

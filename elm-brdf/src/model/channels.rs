@@ -44,8 +44,7 @@ impl BrdfModel {
             _ => return Ok(self.clone()),
         };
         let network = Elm::from_parts(
-            self.network.scaler().cloned(),
-            self.network.hidden().clone(),
+            self.network.map().clone(),
             self.network.beta().select(Axis(1), &places),
             self.network.intercept().select(Axis(0), &places),
         )?;

@@ -1,7 +1,7 @@
 //! A model as its file has it: what was chosen and fitted, and nothing that can be made again.
 
 use elm::persist::{self, Persist};
-use elm::{Activation, Elm, Scaler};
+use elm::{Activation, Elm, FeatureMap, Scaler};
 use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +16,7 @@ pub(super) struct File {
     link: FittedLink,
     layer: Layer,
     scaler: Option<Scaler<f64>>,
+    direct_links: bool,
     beta: Array2<f64>,
     intercept: Array1<f64>,
 }
@@ -28,6 +29,7 @@ impl From<BrdfModel> for File {
             link: model.link,
             layer: model.layer,
             scaler: model.network.scaler().cloned(),
+            direct_links: model.network.map().direct_links(),
             beta: model.network.beta().to_owned(),
             intercept: model.network.intercept().to_owned(),
         }
@@ -39,8 +41,12 @@ impl TryFrom<File> for BrdfModel {
 
     fn try_from(file: File) -> Result<Self, elm::Error> {
         let inputs = file.features.inputs().len();
-        let hidden = file.layer.hidden(inputs, file.beta.nrows())?;
-        let network = Elm::from_parts(file.scaler, hidden, file.beta, file.intercept)?;
+        let links = if file.direct_links { inputs } else { 0 };
+        // Of a file that lies there may be fewer rows than links.
+        let neurons = file.beta.nrows().saturating_sub(links);
+        let hidden = file.layer.hidden(inputs, neurons)?;
+        let map = FeatureMap::new(file.scaler, hidden, file.direct_links)?;
+        let network = Elm::from_parts(map, file.beta, file.intercept)?;
         for (what, expected, found) in [
             ("inputs of the network", inputs, network.inputs()),
             (
@@ -71,6 +77,7 @@ impl TryFrom<File> for BrdfModel {
 impl Persist for BrdfModel {
     const KIND: &'static str = "elm-brdf model";
     const SCALAR: &'static str = "f64";
+    const VERSION: u32 = 3;
 
     fn check(&self) -> Result<(), persist::Error> {
         let groups = self.network.hidden().groups();

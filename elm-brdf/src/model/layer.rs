@@ -1,13 +1,13 @@
 //! How a model's file keeps its hidden layer: as what draws it again, wherever that can be.
 
-use elm::{ElmParams, HiddenLayer};
+use elm::{FeatureMapParams, HiddenLayer};
 use serde::{Deserialize, Serialize};
 
 /// A random layer that is drawn again from its settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Draw {
     /// The settings, seed included.
-    pub params: ElmParams<f64>,
+    pub params: FeatureMapParams<f64>,
     /// For each neuron drawn whether it was kept; all of them without this.
     pub kept: Option<Vec<bool>>,
     /// Numbers among the settings that were chosen for the data: the scales of inputs.
@@ -26,12 +26,8 @@ pub enum Layer {
 
 impl Layer {
     /// The layer that a fit with these settings has drawn.
-    pub(crate) fn of(params: &ElmParams<f64>, drawn: &HiddenLayer<f64>) -> Self {
-        let again = params
-            .clone()
-            .check()
-            .and_then(|checked| checked.hidden_layer(drawn.inputs()));
-        match again {
+    pub(crate) fn of(params: &FeatureMapParams<f64>, drawn: &HiddenLayer<f64>) -> Self {
+        match params.draw(drawn.inputs()) {
             Ok(layer) if layer == *drawn => Self::Drawn(vec![Draw {
                 params: params.clone(),
                 kept: None,
@@ -67,7 +63,7 @@ impl Layer {
                     draw.params.neurons(),
                 )?;
             }
-            let layer = draw.params.clone().check()?.hidden_layer(inputs)?;
+            let layer = draw.params.draw(inputs)?;
             layers.push(match &draw.kept {
                 None => layer,
                 Some(kept) => {

@@ -30,8 +30,8 @@ use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
 pub use layer::{Draw, Layer};
 pub use scaled_once::ScaledOnce;
+pub(crate) use tuned::SideBySide;
 pub use tuned::{Lean, Tuned};
-pub(crate) use tuned::{SideBySide, without_weights};
 
 /// What a [`BrdfModel`] is made of.
 #[derive(Debug, Clone, PartialEq)]
@@ -201,7 +201,7 @@ impl BrdfParams {
         let t = link.to_targets(values)?;
         // Directions are bounded by themselves, and measurements end short of the horizon.
         let network = self.network.clone().bounded(false).fit(&x, &t)?;
-        let layer = Layer::of(&self.network, network.hidden());
+        let layer = Layer::of(self.network.feature_map(), network.hidden());
         Ok(BrdfModel::new(self.features, link, layer, network))
     }
 }

@@ -10,8 +10,8 @@ mod moments;
 mod rows;
 mod survey;
 
-use elm::{Activation, Biases, Distribution, Elm, ElmParams, HiddenLayer, Neurons, Scaler};
-use ndarray::{Array1, Array2, ArrayView2, Axis};
+use elm::{Activation, Biases, Distribution, ElmParams, FeatureMap, Neurons, Scaler};
+use ndarray::{Array2, ArrayView2, Axis};
 
 use super::{BrdfModel, Draw, Provenance};
 use crate::brdf::{Brdf, Fit, check};
@@ -270,27 +270,35 @@ impl Brdf for SideBySide {
     }
 }
 
-/// A drawn layer as a network that gives its hidden-layer matrix, without output weights yet.
-struct Blank {
+/// A drawn feature map, and what draws it again.
+struct Drawn {
     draw: Draw,
-    network: Elm<f64>,
+    map: FeatureMap<f64>,
 }
 
-impl Blank {
-    fn new(params: ElmParams<f64>, scales: usize, scaler: &Scaler<f64>) -> Result<Self> {
-        let inputs = scaler.mean().len();
-        let hidden = params.clone().check()?.hidden_layer(inputs)?;
-        let draw = Draw {
-            params,
-            kept: None,
-            scales,
-        };
-        let network = without_weights(scaler, hidden)?;
-        Ok(Self { draw, network })
+impl Drawn {
+    fn new(params: &ElmParams<f64>, scales: usize, scaler: &Scaler<f64>) -> Result<Self> {
+        let params = params.feature_map();
+        let layer = params.draw(scaler.mean().len())?;
+        Ok(Self {
+            draw: Draw {
+                params: params.clone(),
+                kept: None,
+                scales,
+            },
+            map: FeatureMap::new(Some(scaler.clone()), layer, false)?,
+        })
     }
 
-    fn matrix(&self, x: &Array2<f64>) -> Result<Array2<f64>> {
-        Ok(self.network.hidden_matrix(x)?)
+    /// The neurons that pruning keeps, of all that were drawn.
+    fn pruned(mut self, kept: &[usize]) -> Result<Self> {
+        let mut is_kept = vec![false; self.map.layer().neurons()];
+        for &number in kept {
+            is_kept[number] = true;
+        }
+        self.map = self.map.subset(kept)?;
+        self.draw.kept = Some(is_kept);
+        Ok(self)
     }
 }
 
@@ -347,17 +355,6 @@ fn model_of(problem: &Problem<'_>, finished: Finished) -> Result<BrdfModel> {
         ..
     } = finished;
     Ok(BrdfModel::new(features, link.clone(), layer, network).with_provenance(about))
-}
-
-/// A network that is not fitted yet.
-pub(crate) fn without_weights(scaler: &Scaler<f64>, hidden: HiddenLayer<f64>) -> Result<Elm<f64>> {
-    let beta = Array2::zeros((hidden.neurons(), 1));
-    Ok(Elm::from_parts(
-        Some(scaler.clone()),
-        hidden,
-        beta,
-        Array1::zeros(1),
-    )?)
 }
 
 /// What is known of measurements whatever is fitted to them.

@@ -49,7 +49,7 @@ impl Prior {
                 expected: "at most the number of pairs",
             }));
         }
-        let h = self.layer.hidden_matrix(&self.features.compute(pairs))?;
+        let h = self.map.transform(&self.features.compute(pairs))?;
         let mean = h.dot(&self.mean.beta) + self.mean.constant[0];
         let taught = h.dot(&self.deviations.beta) + &self.deviations.constant;
         let mut covariance = taught.dot(&taught.t());

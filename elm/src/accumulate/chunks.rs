@@ -7,12 +7,12 @@ use rayon::prelude::*;
 use super::Accumulator;
 use crate::check::check_matrix;
 use crate::error::{Error, Result};
+use crate::feature_map::Scaler;
 #[cfg(feature = "rayon")]
 use crate::memory::check_room;
 use crate::model::CheckedParams;
 use crate::network::Elm;
 use crate::scalar::Scalar;
-use crate::scaler::Scaler;
 
 const NO_CHUNKS: Error = Error::Empty {
     what: "chunks",

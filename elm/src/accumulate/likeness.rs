@@ -29,7 +29,7 @@ impl<A: Scalar> Accumulator<A> {
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<Vec<u64>> {
         let mut far = self.far.clone();
-        let Some(scaler) = &self.scaler else {
+        let Some(scaler) = self.map.scaler() else {
             return Ok(far);
         };
         if self.unlike_rows {
@@ -74,9 +74,13 @@ impl<A: Scalar> Accumulator<A> {
 
     /// Whether the network looks at an input: one whose scale is 0 is ignored on purpose.
     fn uses(&self, input: usize) -> bool {
-        let weights = self.hidden.weights();
-        let mut scales = self.hidden.groups().iter().filter_map(|g| g.input_scales());
-        self.direct_links
+        let weights = self.hidden().weights();
+        let mut scales = self
+            .hidden()
+            .groups()
+            .iter()
+            .filter_map(|g| g.input_scales());
+        self.map.direct_links()
             || weights.row(input).iter().any(|w| *w != A::zero())
             || scales.any(|scales| scales[input] != A::zero())
     }

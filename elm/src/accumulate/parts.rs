@@ -7,19 +7,15 @@ use super::{Accumulator, BLOCK, OVERFLOW};
 use crate::bounds::Bounds;
 use crate::check::{check_length, check_matrix};
 use crate::error::{Error, Result};
-use crate::hidden::HiddenLayer;
-use crate::network::check_layer;
+use crate::feature_map::FeatureMap;
 use crate::scalar::Scalar;
-use crate::scaler::Scaler;
 use crate::solve::Solver;
 
 /// The fields of [`Accumulator`].
 #[derive(Deserialize)]
 #[serde(bound = "")]
 pub(super) struct Parts<A: Scalar> {
-    scaler: Option<Scaler<A>>,
-    hidden: HiddenLayer<A>,
-    direct_links: bool,
+    map: FeatureMap<A>,
     solver: Solver,
     intercept: bool,
     inputs: usize,
@@ -40,15 +36,13 @@ impl<A: Scalar> TryFrom<Parts<A>> for Accumulator<A> {
     type Error = Error;
 
     fn try_from(parts: Parts<A>) -> Result<Self> {
-        check_layer(&parts.hidden, parts.scaler.as_ref())?;
-        check_length("inputs", parts.inputs, parts.hidden.inputs())?;
+        check_length("inputs", parts.inputs, parts.map.inputs())?;
         parts.solver.check()?;
         if let Some(bounds) = &parts.bounds {
             bounds.check(parts.inputs, parts.outputs)?;
         }
         check_matrix("triangle", parts.triangle.view())?;
-        let links = if parts.direct_links { parts.inputs } else { 0 };
-        let own = usize::from(parts.intercept) + parts.hidden.neurons() + links;
+        let own = usize::from(parts.intercept) + parts.map.features();
         let columns = parts.triangle.ncols();
         // Subtracted, as the sum might overflow.
         check_length("outputs", columns.saturating_sub(own), parts.outputs)?;
@@ -79,9 +73,7 @@ impl<A: Scalar> TryFrom<Parts<A>> for Accumulator<A> {
             return Err(OVERFLOW);
         }
         let Parts {
-            scaler,
-            hidden,
-            direct_links,
+            map,
             solver,
             intercept,
             inputs,
@@ -98,9 +90,7 @@ impl<A: Scalar> TryFrom<Parts<A>> for Accumulator<A> {
             bounds,
         } = parts;
         Ok(Self {
-            scaler,
-            hidden,
-            direct_links,
+            map,
             solver,
             intercept,
             inputs,

@@ -4,14 +4,12 @@ use ndarray::{Array2, ArrayRef2, ArrayView1, ArrayView2};
 
 use super::{ElmParams, Rows, Targets};
 use crate::bounds::Bounds;
-use crate::check::{check_length, check_matrix};
+use crate::check::check_length;
 use crate::error::{Error, Result};
-use crate::hidden::{HiddenLayer, Inputs, Neurons};
+use crate::feature_map::{FeatureMap, FeatureRows};
 use crate::memory::{check_copies, check_room};
-use crate::network::{Elm, design};
-use crate::predictor::LayerRows;
+use crate::network::Elm;
 use crate::scalar::Scalar;
-use crate::scaler::Scaler;
 use crate::solve::moments::{HiddenRows, RowSource};
 use crate::solve::{LeastSquares, Solver};
 use crate::validate::{FoldFit, HeldOut, Validator};
@@ -64,78 +62,64 @@ impl<A: Scalar> CheckedParams<A> {
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<Elm<A>> {
         let rows = Rows::new(x.view(), t.as_matrix(), weights)?;
-        let (scaler, hidden) = self.prepare(&rows)?;
-        self.output_weights(scaler, hidden, &rows)
+        let map = self.prepare(&rows)?;
+        self.output_weights(map, &rows)
     }
 
-    /// Solves for the output weights of a layer that is there already: drawn by
-    /// [`hidden_layer`](Self::hidden_layer), [pruned](HiddenLayer::subset),
-    /// [joined](HiddenLayer::joined). `scaler` is what the layer takes its inputs to be standardised
-    /// by. Of these settings the solver, the intercept and the direct links count.
+    /// Solves for the output weights of a feature map that is there already: drawn by
+    /// [`FeatureMapParams`](crate::FeatureMapParams), [pruned](FeatureMap::subset), or of layers that were
+    /// [joined](crate::HiddenLayer::joined). Of these settings the solver, the intercept and the bounds
+    /// count.
     ///
     /// The hidden-layer matrix is never there as a whole where [`Ridge`](crate::solve::Ridge) of a given
     /// strength allows that.
     ///
     /// ```
-    /// use elm::{ElmParams, Scaler, solve::Ridge};
+    /// use elm::{ElmParams, solve::Ridge};
     /// use ndarray::{Array1, Axis};
     ///
     /// let x = Array1::linspace(-3.0, 3.0, 60).insert_axis(Axis(1));
     /// let t = x.mapv(f64::sin);
-    /// let params = ElmParams::new(40).solver(Ridge::relative(1e-6)).check()?;
+    /// let params = ElmParams::new(40).solver(Ridge::relative(1e-6));
     /// let half: Vec<usize> = (0..40).step_by(2).collect();
-    /// let layer = params.hidden_layer(1)?.subset(&half)?;
-    /// let model = params.fit_layer(Some(Scaler::measured(&x)?), layer, &x, &t, None)?;
+    /// let map = params.feature_map().draw_on(&x)?.subset(&half)?;
+    /// let model = params.check()?.fit_map(map, &x, &t, None)?;
     /// assert_eq!(model.hidden().neurons(), 20);
     /// # Ok::<(), elm::Error>(())
     /// ```
     ///
     /// # Errors
-    /// Those of [`fit_weighted`](Self::fit_weighted); [`Error::Shape`] for a layer or a scaler of
-    /// another number of inputs.
-    pub fn fit_layer<T: Targets<A>>(
+    /// Those of [`fit_weighted`](Self::fit_weighted); [`Error::Shape`] for a map of another number of
+    /// inputs.
+    pub fn fit_map<T: Targets<A>>(
         &self,
-        scaler: Option<Scaler<A>>,
-        hidden: HiddenLayer<A>,
+        map: FeatureMap<A>,
         x: &ArrayRef2<A>,
         t: &T,
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<Elm<A>> {
-        let t = t.as_matrix();
-        let rows = self.rows_of_layer(scaler.as_ref(), &hidden, x.view(), t, weights)?;
-        self.output_weights(scaler, hidden, &rows)
+        let rows = Self::rows_of_map(&map, x.view(), t.as_matrix(), weights)?;
+        self.output_weights(map, &rows)
     }
 
-    /// Checks that rows, a layer that is there already and its scaler go together.
-    pub(crate) fn rows_of_layer<'a>(
-        &self,
-        scaler: Option<&Scaler<A>>,
-        hidden: &HiddenLayer<A>,
+    /// Checks that rows and a map that is there already go together.
+    pub(crate) fn rows_of_map<'a>(
+        map: &FeatureMap<A>,
         x: ArrayView2<'a, A>,
         t: ArrayView2<'a, A>,
         weights: Option<ArrayView1<'a, A>>,
     ) -> Result<Rows<'a, A>> {
         let rows = Rows::new(x, t, weights)?;
-        check_size(x, hidden.neurons())?;
-        check_length("inputs of the layer", hidden.inputs(), x.ncols())?;
-        if let Some(scaler) = scaler {
-            check_length("inputs of the scaler", scaler.mean().len(), x.ncols())?;
-        }
+        check_size(x, map.layer().neurons())?;
+        check_length("inputs of the feature map", map.inputs(), x.ncols())?;
         Ok(rows)
     }
 
-    /// The solution for a layer and data that go together.
-    fn output_weights(
-        &self,
-        scaler: Option<Scaler<A>>,
-        hidden: HiddenLayer<A>,
-        rows: &Rows<'_, A>,
-    ) -> Result<Elm<A>> {
+    /// The solution for a map and data that go together.
+    fn output_weights(&self, map: FeatureMap<A>, rows: &Rows<'_, A>) -> Result<Elm<A>> {
         let (x, t, weights) = (rows.x(), rows.t(), rows.weights());
-        let links = self.0.direct_links;
-        let layer = LayerRows::new(&hidden, scaler.as_ref(), links, x);
         let mut source = RowSource {
-            hidden: HiddenRows::Layer(Box::new(layer)),
+            hidden: HiddenRows::Map(Box::new(FeatureRows::new(&map, x))),
             targets: t,
             weights,
             intercept: self.has_intercept(),
@@ -143,32 +127,13 @@ impl<A: Scalar> CheckedParams<A> {
         let solution = match self.0.solver.solve_rows(&mut source)? {
             Some(solution) => solution,
             None => {
-                let design = self.design(x, scaler.as_ref(), &hidden)?;
+                let design = Self::design(x, &map)?;
                 let problem = self.problem(&design, t, weights.as_ref())?;
                 self.0.solver.solve(&problem)?
             }
         };
         let bounds = Bounds::of(x, t, weights, self.0.bounded);
-        Ok(Elm::assemble(scaler, hidden, links, solution, bounds))
-    }
-
-    /// The random layer alone, for this many inputs: what a [`fit`](Self::fit) draws. Whoever keeps
-    /// these settings need keep no weights of it; see [`Elm::from_parts`].
-    ///
-    /// # Errors
-    /// [`Error::Empty`] without inputs, [`Error::Shape`] for another number of input scales,
-    /// [`Error::TooLarge`]; [`Error::Conflict`] for neurons that are laid on training rows
-    /// ([`Biases::OnData`](crate::Biases::OnData), [`Kind::Radial`](crate::Kind::Radial)), as there are none.
-    pub fn hidden_layer(&self, inputs: usize) -> Result<HiddenLayer<A>> {
-        if self.needs_rows() {
-            return Err(Error::Conflict {
-                first: "neurons laid on training rows",
-                second: "a layer without them",
-            });
-        }
-        let nowhere = Array2::zeros((1, inputs));
-        check_matrix("inputs", nowhere.view())?;
-        self.layer(nowhere.view().into(), None)
+        Ok(Elm::assemble(map, solution, bounds))
     }
 
     /// Held-out predictions for every row, from one random layer and one factorisation: `folds`
@@ -249,42 +214,24 @@ impl<A: Scalar> CheckedParams<A> {
 
     /// Draws the layer and applies it.
     pub(crate) fn draw(&self, rows: &Rows<'_, A>) -> Result<Drawn<A>> {
-        let (scaler, hidden) = self.prepare(rows)?;
-        let design = self.design(rows.x(), scaler.as_ref(), &hidden)?;
-        Ok(Drawn {
-            scaler,
-            hidden,
-            design,
-        })
+        let map = self.prepare(rows)?;
+        let design = Self::design(rows.x(), &map)?;
+        Ok(Drawn { map, design })
     }
 
     /// Measures the inputs and draws the layer.
-    fn prepare(&self, rows: &Rows<'_, A>) -> Result<(Option<Scaler<A>>, HiddenLayer<A>)> {
-        let (x, weights) = (rows.x(), rows.weights());
-        check_size(x, self.0.neurons())?;
-        let scaler = self.0.standardise.then(|| Scaler::measure(x, weights));
-        let hidden = self.layer(Inputs::new(x, scaler.as_ref()), weights)?;
-        Ok((scaler, hidden))
+    fn prepare(&self, rows: &Rows<'_, A>) -> Result<FeatureMap<A>> {
+        check_size(rows.x(), self.0.neurons())?;
+        let params = self.0.feature_map();
+        params.draw_weighted(rows.x(), rows.weights())
     }
 
-    /// The hidden-layer matrix, with the inputs beside it where they are linked directly.
-    pub(crate) fn design(
-        &self,
-        x: ArrayView2<'_, A>,
-        scaler: Option<&Scaler<A>>,
-        hidden: &HiddenLayer<A>,
-    ) -> Result<Array2<A>> {
+    /// The matrix of features.
+    pub(crate) fn design(x: ArrayView2<'_, A>, map: &FeatureMap<A>) -> Result<Array2<A>> {
         // The matrix itself, prepared for a factorisation, the factorisation's own copy and a factor.
-        let columns = hidden.neurons() + if self.0.direct_links { x.ncols() } else { 0 };
-        check_copies(
-            "the hidden-layer matrix with its factors",
-            x.nrows(),
-            columns,
-            4,
-        )?;
-        let scaled = scaler.map(|scaler| scaler.transform(x));
-        let x = scaled.as_ref().map_or(x, |scaled| scaled.view());
-        Ok(design(hidden, self.0.direct_links, x))
+        let what = "the hidden-layer matrix with its factors";
+        check_copies(what, x.nrows(), map.features(), 4)?;
+        Ok(map.apply(x))
     }
 
     pub(crate) fn problem<'a>(
@@ -300,25 +247,9 @@ impl<A: Scalar> CheckedParams<A> {
         }
     }
 
-    /// The random layer for these (standardised) rows with these positive weights.
-    pub(crate) fn layer(
-        &self,
-        x: Inputs<'_, A>,
-        weights: Option<ArrayView1<'_, A>>,
-    ) -> Result<HiddenLayer<A>> {
-        let params = &self.0;
-        // A failed allocation would abort the program.
-        let per_neuron = x.ncols().saturating_add(1);
-        check_room("the hidden layer", per_neuron, params.neurons())?;
-        if !params.input_scales.is_empty() {
-            check_length("input scales", params.input_scales.len(), x.ncols())?;
-        }
-        Ok(params.plan().draw(x, weights))
-    }
-
     /// Whether the layer takes more of the rows than the number of their inputs.
     pub(crate) fn needs_rows(&self) -> bool {
-        self.0.groups().any(Neurons::need_rows)
+        self.0.map.needs_rows()
     }
 
     /// Equation 10 has no room for a constant; asking for both explicitly is an error later.
@@ -328,7 +259,7 @@ impl<A: Scalar> CheckedParams<A> {
     }
 
     pub(crate) fn standardises(&self) -> bool {
-        self.0.standardise
+        self.0.map.standardise
     }
 
     pub(crate) fn is_bounded(&self) -> bool {
@@ -336,7 +267,7 @@ impl<A: Scalar> CheckedParams<A> {
     }
 
     pub(crate) fn links_directly(&self) -> bool {
-        self.0.direct_links
+        self.0.map.direct_links
     }
 
     pub(crate) fn solver(&self) -> Solver {
@@ -357,9 +288,8 @@ fn check_size<A: Scalar>(x: ArrayView2<'_, A>, neurons: usize) -> Result<()> {
     check_room("the hidden-layer matrix", x.nrows().min(neurons), neurons)
 }
 
-/// A random layer and what it makes of the training inputs.
+/// A feature map and what it makes of the training inputs.
 pub(crate) struct Drawn<A: Scalar> {
-    pub(crate) scaler: Option<Scaler<A>>,
-    pub(crate) hidden: HiddenLayer<A>,
+    pub(crate) map: FeatureMap<A>,
     pub(crate) design: Array2<A>,
 }

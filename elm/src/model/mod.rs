@@ -7,8 +7,8 @@ mod settings;
 use ndarray::{ArrayBase, ArrayRef1, ArrayRef2, ArrayView2, Axis, Data, Ix1, Ix2};
 
 use crate::activation::Activation;
-use crate::error::{Error, Result};
-use crate::hidden::{Biases, Distribution, Kind, Neurons, Plan};
+use crate::error::Result;
+use crate::feature_map::{Biases, Distribution, FeatureMapParams, Kind, Neurons};
 use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::solve::Solver;
@@ -67,18 +67,9 @@ pub(crate) use rows::Rows;
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct ElmParams<A: Scalar> {
-    /// The neurons that the setters here describe.
-    neurons: Neurons<A>,
-    /// Those of other kinds.
-    others: Vec<Neurons<A>>,
-    distribution: Distribution,
-    scale: f64,
-    input_scales: Vec<f64>,
-    seed: u64,
+    map: FeatureMapParams<A>,
     solver: Solver,
     intercept: Option<bool>,
-    standardise: bool,
-    direct_links: bool,
     bounded: bool,
 }
 
@@ -87,16 +78,9 @@ impl<A: Scalar> ElmParams<A> {
     #[must_use]
     pub fn new(neurons: usize) -> Self {
         Self {
-            neurons: Neurons::new(neurons, Activation::default()),
-            others: Vec::new(),
-            distribution: Distribution::default(),
-            scale: 1.0,
-            input_scales: Vec::new(),
-            seed: 0,
+            map: FeatureMapParams::new(neurons),
             solver: Solver::default(),
             intercept: None,
-            standardise: true,
-            direct_links: false,
             bounded: true,
         }
     }
@@ -107,7 +91,7 @@ impl<A: Scalar> ElmParams<A> {
     pub fn with_neurons(mut self, neurons: usize) -> Self {
         let before = self.neurons();
         let (mut counted, mut given) = (0.0, 0);
-        for group in self.groups_mut() {
+        for group in self.map.groups_mut() {
             counted += group.count as f64;
             let up_to_here = if counted < before as f64 {
                 (neurons as f64 * (counted / before as f64)).round() as usize
@@ -120,40 +104,37 @@ impl<A: Scalar> ElmParams<A> {
         self
     }
 
-    fn groups(&self) -> impl Iterator<Item = &Neurons<A>> {
-        std::iter::once(&self.neurons).chain(&self.others)
-    }
-
-    fn groups_mut(&mut self) -> impl Iterator<Item = &mut Neurons<A>> {
-        std::iter::once(&mut self.neurons).chain(&mut self.others)
-    }
-
     /// Number of neurons, of all kinds together.
     #[must_use]
     pub fn neurons(&self) -> usize {
-        let add = |sum: usize, group: &Neurons<A>| sum.saturating_add(group.count);
-        self.groups().fold(0, add)
+        self.map.neurons()
+    }
+
+    /// What the feature map is drawn from.
+    #[must_use]
+    pub fn feature_map(&self) -> &FeatureMapParams<A> {
+        &self.map
     }
 
     pub(crate) fn links_directly(&self) -> bool {
-        self.direct_links
+        self.map.direct_links
     }
 
     pub(crate) fn get_seed(&self) -> u64 {
-        self.seed
+        self.map.seed
     }
 
     /// The activation function of the hidden neurons.
     #[must_use]
     pub fn activation(mut self, activation: Activation<A>) -> Self {
-        self.neurons.activation = activation;
+        self.map.neurons.activation = activation;
         self
     }
 
     /// What the activation function is applied to.
     #[must_use]
     pub fn kind(mut self, kind: Kind) -> Self {
-        self.neurons.kind = kind;
+        self.map.neurons.kind = kind;
         self
     }
 
@@ -162,21 +143,21 @@ impl<A: Scalar> ElmParams<A> {
     /// the [`input_scales`](Self::input_scales) and the seed.
     #[must_use]
     pub fn and(mut self, neurons: Neurons<A>) -> Self {
-        self.others.push(neurons);
+        self.map.others.push(neurons);
         self
     }
 
     /// The distribution of hidden weights and biases.
     #[must_use]
     pub fn distribution(mut self, distribution: Distribution) -> Self {
-        self.distribution = distribution;
+        self.map.distribution = distribution;
         self
     }
 
     /// Multiplies the random weights.
     #[must_use]
     pub fn scale(mut self, scale: f64) -> Self {
-        self.scale = scale;
+        self.map.scale = scale;
         self
     }
 
@@ -184,21 +165,21 @@ impl<A: Scalar> ElmParams<A> {
     /// is to be ignored. Empty, the default, means 1 for all.
     #[must_use]
     pub fn input_scales(mut self, input_scales: Vec<f64>) -> Self {
-        self.input_scales = input_scales;
+        self.map.input_scales = input_scales;
         self
     }
 
     /// Where the random biases come from.
     #[must_use]
     pub fn biases(mut self, biases: Biases) -> Self {
-        self.neurons.biases = biases;
+        self.map.neurons.biases = biases;
         self
     }
 
     /// Seeds the random layer. One seed gives one layer, on every platform.
     #[must_use]
     pub fn seed(mut self, seed: u64) -> Self {
-        self.seed = seed;
+        self.map.seed = seed;
         self
     }
 
@@ -220,7 +201,7 @@ impl<A: Scalar> ElmParams<A> {
     /// Whether inputs are brought to mean 0 and standard deviation 1 first.
     #[must_use]
     pub fn standardise(mut self, standardise: bool) -> Self {
-        self.standardise = standardise;
+        self.map.standardise = standardise;
         self
     }
 
@@ -228,7 +209,7 @@ impl<A: Scalar> ElmParams<A> {
     /// random vector functional link network (Pao, Park and Sobajic, 1994).
     #[must_use]
     pub fn direct_links(mut self, direct_links: bool) -> Self {
-        self.direct_links = direct_links;
+        self.map.direct_links = direct_links;
         self
     }
 
@@ -245,55 +226,11 @@ impl<A: Scalar> ElmParams<A> {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`Error::Parameter`] naming the first setting that is out of range.
+    /// [`Error::Parameter`](crate::Error::Parameter) naming the first setting that is out of range.
     pub fn check(self) -> Result<CheckedParams<A>> {
-        let parameter = |name, value, expected| {
-            Err(Error::Parameter {
-                name,
-                value,
-                expected,
-            })
-        };
-        if self.neurons() == 0 {
-            return parameter("neurons", 0.0, "at least 1");
-        }
-        // Written so that NaN fails too.
-        if !(self.scale > 0.0 && self.scale.is_finite()) {
-            return parameter("scale", self.scale, "positive and finite");
-        }
-        let not_negative = |value: f64| value >= 0.0 && value.is_finite();
-        if let Some(&value) = self
-            .input_scales
-            .iter()
-            .find(|value| !not_negative(**value))
-        {
-            return parameter("input_scales", value, "finite and not negative");
-        }
-        if self.distribution == Distribution::StudentT(0) {
-            return parameter("degrees of freedom", 0.0, "at least 1");
-        }
-        for group in self.groups() {
-            if !(group.scale > 0.0 && group.scale.is_finite()) {
-                return parameter("scale of neurons", group.scale, "positive and finite");
-            }
-            if let Biases::Scaled(value) = group.biases
-                && !not_negative(value)
-            {
-                return parameter("biases", value, "finite and not negative");
-            }
-        }
+        self.map.check()?;
         self.solver.check()?;
         Ok(CheckedParams(self))
-    }
-
-    fn plan(&self) -> Plan<A> {
-        Plan {
-            groups: self.groups().cloned().collect(),
-            distribution: self.distribution,
-            scale: self.scale,
-            input_scales: self.input_scales.clone(),
-            seed: self.seed,
-        }
     }
 
     /// Checks the settings and fits; see [`CheckedParams::fit`].

@@ -12,7 +12,7 @@ use std::marker::PhantomData;
 use super::ElmParams;
 use crate::activation::Activation;
 use crate::error::Error;
-use crate::hidden::{Biases, Distribution, Kind, Neurons};
+use crate::feature_map::{Biases, Distribution, FeatureMapParams, Kind, Neurons};
 use crate::scalar::Scalar;
 use crate::solve::Solver;
 
@@ -20,16 +20,9 @@ use crate::solve::Solver;
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "", rename = "ElmParams")]
 struct Fields<A: Scalar> {
-    neurons: Neurons<A>,
-    others: Vec<Neurons<A>>,
-    distribution: Distribution,
-    scale: f64,
-    input_scales: Vec<f64>,
-    seed: u64,
+    map: FeatureMapParams<A>,
     solver: Solver,
     intercept: Option<bool>,
-    standardise: bool,
-    direct_links: bool,
     bounded: bool,
 }
 
@@ -130,7 +123,7 @@ impl<A: Scalar> Serialize for ElmParams<A> {
         if !serializer.is_human_readable() {
             return Fields::from(own).serialize(serializer);
         }
-        let Self { neurons, .. } = own;
+        let FeatureMapParams { neurons, .. } = own.map;
         let plain = neurons.scale == 1.0;
         let named = Named {
             activation: plain.then(|| neurons.activation.clone()),
@@ -141,15 +134,15 @@ impl<A: Scalar> Serialize for ElmParams<A> {
             } else {
                 Count::Neurons(neurons)
             },
-            and: own.others,
-            distribution: own.distribution,
-            scale: own.scale,
-            input_scales: own.input_scales,
-            seed: own.seed,
+            and: own.map.others,
+            distribution: own.map.distribution,
+            scale: own.map.scale,
+            input_scales: own.map.input_scales,
+            seed: own.map.seed,
             solver: own.solver,
             intercept: own.intercept,
-            standardise: own.standardise,
-            direct_links: own.direct_links,
+            standardise: own.map.standardise,
+            direct_links: own.map.direct_links,
             bounded: own.bounded,
         };
         named.serialize(serializer)
@@ -182,16 +175,18 @@ impl<A: Scalar> From<Named<A>> for ElmParams<A> {
             neurons.biases = biases;
         }
         Self {
-            neurons,
-            others: named.and,
-            distribution: named.distribution,
-            scale: named.scale,
-            input_scales: named.input_scales,
-            seed: named.seed,
+            map: FeatureMapParams {
+                neurons,
+                others: named.and,
+                distribution: named.distribution,
+                scale: named.scale,
+                input_scales: named.input_scales,
+                seed: named.seed,
+                standardise: named.standardise,
+                direct_links: named.direct_links,
+            },
             solver: named.solver,
             intercept: named.intercept,
-            standardise: named.standardise,
-            direct_links: named.direct_links,
             bounded: named.bounded,
         }
     }
@@ -200,16 +195,9 @@ impl<A: Scalar> From<Named<A>> for ElmParams<A> {
 impl<A: Scalar> From<Fields<A>> for ElmParams<A> {
     fn from(fields: Fields<A>) -> Self {
         Self {
-            neurons: fields.neurons,
-            others: fields.others,
-            distribution: fields.distribution,
-            scale: fields.scale,
-            input_scales: fields.input_scales,
-            seed: fields.seed,
+            map: fields.map,
             solver: fields.solver,
             intercept: fields.intercept,
-            standardise: fields.standardise,
-            direct_links: fields.direct_links,
             bounded: fields.bounded,
         }
     }
@@ -218,16 +206,9 @@ impl<A: Scalar> From<Fields<A>> for ElmParams<A> {
 impl<A: Scalar> From<ElmParams<A>> for Fields<A> {
     fn from(params: ElmParams<A>) -> Self {
         Self {
-            neurons: params.neurons,
-            others: params.others,
-            distribution: params.distribution,
-            scale: params.scale,
-            input_scales: params.input_scales,
-            seed: params.seed,
+            map: params.map,
             solver: params.solver,
             intercept: params.intercept,
-            standardise: params.standardise,
-            direct_links: params.direct_links,
             bounded: params.bounded,
         }
     }

@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::activation::Activation;
+use crate::simd::Level;
 use crate::{Biases, ElmParams, Kind, Neurons};
 
 /// Uniform on [-2, 2).

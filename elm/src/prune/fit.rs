@@ -5,11 +5,10 @@ use ndarray::{ArrayRef2, ArrayView1, Axis};
 use super::{Keep, Pruned, choose};
 use crate::bounds::Bounds;
 use crate::error::{Error, Result};
-use crate::hidden::HiddenLayer;
+use crate::feature_map::FeatureMap;
 use crate::model::{CheckedParams, Drawn, ElmParams, Rows, Targets};
 use crate::network::Elm;
 use crate::scalar::Scalar;
-use crate::scaler::Scaler;
 use crate::solve::{LeastSquares, Ridge, Solver};
 
 impl<A: Scalar> ElmParams<A> {
@@ -64,31 +63,24 @@ impl<A: Scalar> CheckedParams<A> {
         self.prune(drawn, &rows, keep, ridge)
     }
 
-    /// As [`fit_pruned_weighted`](Self::fit_pruned_weighted), of a layer that is there already: see
-    /// [`fit_layer`](Self::fit_layer).
+    /// As [`fit_pruned_weighted`](Self::fit_pruned_weighted), of a feature map that is there already: see
+    /// [`fit_map`](Self::fit_map).
     ///
     /// # Errors
-    /// Those of [`fit_pruned`](Self::fit_pruned) and [`fit_layer`](Self::fit_layer).
-    pub fn prune_layer<T: Targets<A>>(
+    /// Those of [`fit_pruned`](Self::fit_pruned) and [`fit_map`](Self::fit_map).
+    pub fn prune_map<T: Targets<A>>(
         &self,
-        scaler: Option<Scaler<A>>,
-        hidden: HiddenLayer<A>,
+        map: FeatureMap<A>,
         x: &ArrayRef2<A>,
         t: &T,
         keep: Keep,
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<Pruned<A>> {
         let ridge = self.pruning_ridge()?;
-        keep.check(hidden.neurons())?;
-        let rows =
-            self.rows_of_layer(scaler.as_ref(), &hidden, x.view(), t.as_matrix(), weights)?;
-        let design = self.design(rows.x(), scaler.as_ref(), &hidden)?;
-        let drawn = Drawn {
-            scaler,
-            hidden,
-            design,
-        };
-        self.prune(drawn, &rows, keep, ridge)
+        keep.check(map.layer().neurons())?;
+        let rows = Self::rows_of_map(&map, x.view(), t.as_matrix(), weights)?;
+        let design = Self::design(rows.x(), &map)?;
+        self.prune(Drawn { map, design }, &rows, keep, ridge)
     }
 
     fn pruning_ridge(&self) -> Result<Ridge> {
@@ -109,11 +101,8 @@ impl<A: Scalar> CheckedParams<A> {
         ridge: Ridge,
     ) -> Result<Pruned<A>> {
         let (t, weights) = (rows.t(), rows.weights());
-        let Drawn {
-            scaler,
-            hidden,
-            design,
-        } = drawn;
+        let Drawn { map, design } = drawn;
+        let neurons = map.layer().neurons();
         let wide = (A::widen(design.view()), A::widen(t));
         let wide_weights = weights.map(A::widen);
         let mut problem = LeastSquares::of_views(wide.0.view(), wide.1.view())?;
@@ -121,13 +110,13 @@ impl<A: Scalar> CheckedParams<A> {
             problem = problem.weights(weights)?;
         }
         let problem = problem.intercept(self.has_intercept());
-        let (mut kept, path) = choose(&problem, hidden.neurons(), ridge, keep)?;
+        let (mut kept, path) = choose(&problem, neurons, ridge, keep)?;
         kept.sort_unstable();
 
         let columns: Vec<usize> = kept
             .iter()
             .copied()
-            .chain(hidden.neurons()..design.ncols())
+            .chain(neurons..design.ncols())
             .collect();
         let design = design.select(Axis(1), &columns);
         let solution = self
@@ -135,9 +124,7 @@ impl<A: Scalar> CheckedParams<A> {
             .solve(&self.problem(&design, t, weights.as_ref())?)?;
         Ok(Pruned {
             model: Elm::assemble(
-                scaler,
-                hidden.select(&kept),
-                self.links_directly(),
+                map.select(&kept),
                 solution,
                 Bounds::of(rows.x(), t, weights, self.is_bounded()),
             ),

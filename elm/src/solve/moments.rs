@@ -12,13 +12,13 @@ use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, ShapeBuilder, s};
 use super::frame::{Frame, weighted_magnitudes};
 use super::tiles::magnitudes;
 use crate::error::Result;
-use crate::predictor::LayerRows;
+use crate::feature_map::FeatureRows;
 use crate::scalar::{Scalar, power_of_two};
 
 /// Where the rows of a hidden-layer matrix come from.
 pub(crate) enum HiddenRows<'a, A: Scalar> {
     /// From the inputs, as they are needed.
-    Layer(Box<LayerRows<'a, A>>),
+    Map(Box<FeatureRows<'a, A>>),
     /// From the matrix itself.
     Matrix(ArrayView2<'a, A>),
 }
@@ -26,14 +26,14 @@ pub(crate) enum HiddenRows<'a, A: Scalar> {
 impl<A: Scalar> HiddenRows<'_, A> {
     fn rows(&self) -> usize {
         match self {
-            Self::Layer(layer) => layer.rows(),
+            Self::Map(layer) => layer.rows(),
             Self::Matrix(matrix) => matrix.nrows(),
         }
     }
 
     fn columns(&self) -> usize {
         match self {
-            Self::Layer(layer) => layer.columns(),
+            Self::Map(layer) => layer.columns(),
             Self::Matrix(matrix) => matrix.ncols(),
         }
     }
@@ -42,7 +42,7 @@ impl<A: Scalar> HiddenRows<'_, A> {
     /// are there already, or its sums are found to be out of range.
     fn scale(&self, root_weights: &Array1<A>) -> A {
         match self {
-            Self::Layer(_) => A::one(),
+            Self::Map(_) => A::one(),
             Self::Matrix(matrix) => {
                 let largest = weighted_magnitudes(*matrix, root_weights);
                 power_of_two(largest.iter().fold(A::zero(), |m, x| m.max(*x)))
@@ -53,7 +53,7 @@ impl<A: Scalar> HiddenRows<'_, A> {
     /// As [`scale`](Self::scale), by weights in `f64`.
     pub(super) fn scale_wide(&self, root_weights: &Array1<f64>) -> f64 {
         match self {
-            Self::Layer(_) => 1.0,
+            Self::Map(_) => 1.0,
             Self::Matrix(matrix) => {
                 let largest = magnitudes(*matrix, root_weights);
                 power_of_two(largest.iter().fold(0.0, |m: f64, x| m.max(*x)))
@@ -71,7 +71,7 @@ impl<A: Scalar> HiddenRows<'_, A> {
         stride: usize,
     ) -> Result<()> {
         match self {
-            Self::Layer(layer) => layer.write(rows, shift, to, stride)?,
+            Self::Map(layer) => layer.write(rows, shift, to, stride)?,
             Self::Matrix(matrix) => {
                 let rows = matrix.slice(s![rows, ..]);
                 for (row, to) in rows.rows().into_iter().zip(to.chunks_mut(stride)) {

@@ -53,7 +53,7 @@ use serde::{Deserialize, Serialize};
 use crate::activation::Activation;
 use crate::check::{check_length, check_matrix};
 use crate::error::{Error, Result};
-use crate::hidden::Biases;
+use crate::feature_map::Biases;
 use crate::model::{ElmParams, Targets};
 use crate::network::Elm;
 use crate::scalar::Scalar;

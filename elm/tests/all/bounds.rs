@@ -117,8 +117,7 @@ fn the_distance_from_the_data_is_told_in_standard_deviations() {
     let expected = array![0.0, 3.0, 5.0] / (2.0_f64 / 3.0).sqrt();
     approx::assert_relative_eq!(distance, expected, max_relative = 1e-14);
     let given = Elm::from_parts(
-        model.scaler().cloned(),
-        model.hidden().clone(),
+        model.map().clone(),
         model.beta().to_owned(),
         model.intercept().to_owned(),
     );

@@ -77,7 +77,7 @@ fn files_are_written_whole_in_the_form_their_name_asks_for() {
     }
     let text = std::fs::read_to_string(dir.path().join("model.json")).unwrap();
     assert!(
-        text.starts_with("{\n  \"format\": \"elm model\",\n  \"version\": 2,"),
+        text.starts_with("{\n  \"format\": \"elm model\",\n  \"version\": 3,"),
         "{text:.80}"
     );
     assert_eq!(
@@ -172,17 +172,17 @@ fn each_kind_of_damage_has_its_own_error() {
     );
     assert!(matches!(refuse(b"%PDF-1.7 and so on"), Error::Foreign));
     assert!(matches!(
-        refuse(&with(8, 3)),
+        refuse(&with(8, 4)),
         Error::Future {
-            found: 3,
-            supported: 2
+            found: 4,
+            supported: 3
         }
     ));
     assert!(matches!(
-        refuse(&with(8, 1)),
+        refuse(&with(8, 2)),
         Error::Past {
-            found: 1,
-            supported: 2
+            found: 2,
+            supported: 3
         }
     ));
     assert!(matches!(refuse(&with(13, b'E')), Error::Kind { .. }));
@@ -220,16 +220,18 @@ fn a_file_that_contradicts_itself_is_refused() {
         mutate(&|c| c["intercept"] = serde_json::json!({"v": 1, "dim": [1], "data": [0.0]})),
         mutate(&|c| c["beta"]["dim"] = huge.clone()),
         mutate(&|c| c["beta"] = serde_json::json!({"v": 1, "dim": [1, 2], "data": [0.0, 0.0]})),
-        mutate(&|c| c["scaler"]["mean"] = serde_json::json!({"v": 1, "dim": [1], "data": [0.0]})),
+        mutate(&|c| {
+            c["map"]["scaler"]["mean"] = serde_json::json!({"v": 1, "dim": [1], "data": [0.0]})
+        }),
         mutate(&|c| c["beta"]["data"][0] = serde_json::json!(null)),
-        mutate(&|c| c["hidden"]["groups"][0]["activation"] = serde_json::json!("cube")),
-        mutate(&|c| c["hidden"]["groups"][1]["neurons"] = serde_json::json!(5)),
-        mutate(&|c| c["hidden"]["groups"][1]["neurons"] = serde_json::json!(u64::MAX)),
-        mutate(&|c| c["hidden"]["groups"] = serde_json::json!([])),
-        mutate(&|c| c["hidden"]["groups"][2]["radial"]["dim"] = serde_json::json!([2])),
-        mutate(&|c| c["hidden"]["groups"][0]["radial"] = scales(&[0.5, 1.0])),
-        mutate(&|c| c["hidden"]["groups"][2]["radial"]["data"][1] = serde_json::json!(null)),
-        mutate(&|c| c["direct_links"] = serde_json::json!(true)),
+        mutate(&|c| c["map"]["layer"]["groups"][0]["activation"] = serde_json::json!("cube")),
+        mutate(&|c| c["map"]["layer"]["groups"][1]["neurons"] = serde_json::json!(5)),
+        mutate(&|c| c["map"]["layer"]["groups"][1]["neurons"] = serde_json::json!(u64::MAX)),
+        mutate(&|c| c["map"]["layer"]["groups"] = serde_json::json!([])),
+        mutate(&|c| c["map"]["layer"]["groups"][2]["radial"]["dim"] = serde_json::json!([2])),
+        mutate(&|c| c["map"]["layer"]["groups"][0]["radial"] = scales(&[0.5, 1.0])),
+        mutate(&|c| c["map"]["layer"]["groups"][2]["radial"]["data"][1] = serde_json::json!(null)),
+        mutate(&|c| c["map"]["direct_links"] = serde_json::json!(true)),
     ] {
         assert!(
             error.starts_with("the file holds no sound elm model"),

@@ -2,7 +2,7 @@
 
 use elm::prune::{Keep, Pruned};
 use elm::solve::{Inverse, PseudoInverse, Ridge};
-use elm::{Activation, Biases, Elm, ElmParams, Error, Neurons, Scaler, metrics};
+use elm::{Activation, Biases, Elm, ElmParams, Error, FeatureMap, Neurons, Scaler, metrics};
 use elm_datasets::toy::{self, Toy};
 use ndarray::{Array1, Array2, Axis, array, s};
 
@@ -284,24 +284,25 @@ fn a_layer_that_is_there_already_is_fitted_as_when_it_was_drawn() {
     for solver in [Ridge::relative(1e-6), Ridge::leave_one_out()] {
         let checked = ElmParams::new(30).seed(7).solver(solver).check().unwrap();
         let drawn = checked.fit(&x, &t).unwrap();
-        let layer = checked.hidden_layer(4).unwrap();
-        let scaler = drawn.scaler().cloned();
-        let given = checked.fit_layer(scaler.clone(), layer.clone(), &x, &t, None);
+        let map = checked.params().feature_map().draw_on(&x).unwrap();
+        let given = checked.fit_map(map.clone(), &x, &t, None);
         let difference = given.unwrap().predict(&x).unwrap() - drawn.predict(&x).unwrap();
         assert!(difference.iter().all(|d| d.abs() < 1e-9));
         let keep = Keep::Neurons(9);
-        let given = checked.prune_layer(scaler.clone(), layer.clone(), &x, &t, keep, None);
+        let given = checked.prune_map(map.clone(), &x, &t, keep, None);
         assert_eq!(given.unwrap(), checked.fit_pruned(&x, &t, keep).unwrap());
 
         let narrow = Scaler::measured(&x.slice(s![.., ..2])).unwrap();
-        for (scaler, layer, t) in [
-            (scaler.clone(), checked.hidden_layer(3).unwrap(), &t),
-            (scaler, layer.clone(), &t.slice(s![..9]).to_owned()),
-            (Some(narrow), layer, &t),
+        let layer = checked.params().feature_map().draw(3).unwrap();
+        let refused = FeatureMap::new(Some(narrow), layer.clone(), false);
+        assert!(matches!(refused, Err(Error::Shape { .. })), "{refused:?}");
+        for (map, t) in [
+            (FeatureMap::new(None, layer, false).unwrap(), &t),
+            (map, &t.slice(s![..9]).to_owned()),
         ] {
-            let refused = checked.fit_layer(scaler.clone(), layer.clone(), &x, t, None);
+            let refused = checked.fit_map(map.clone(), &x, t, None);
             assert!(matches!(refused, Err(Error::Shape { .. })), "{refused:?}");
-            let refused = checked.prune_layer(scaler, layer, &x, t, Keep::Neurons(2), None);
+            let refused = checked.prune_map(map, &x, t, Keep::Neurons(2), None);
             assert!(matches!(refused, Err(Error::Shape { .. })), "{refused:?}");
         }
     }

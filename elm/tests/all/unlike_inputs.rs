@@ -2,7 +2,9 @@
 
 use crate::common::normal;
 use elm::solve::Ridge;
-use elm::{Accumulator, Biases, ElmParams, Error, Scalar, Scaler, ScalerBuilder, metrics};
+use elm::{
+    Accumulator, Biases, ElmParams, Error, FeatureMap, Scalar, Scaler, ScalerBuilder, metrics,
+};
 use ndarray::{Array1, Array2, ArrayRef2, Axis, array, s};
 
 /// Evenly spread over [-1, 1) without a pattern.
@@ -241,8 +243,9 @@ fn a_category_of_many_levels_does_not_saturate_the_layer() {
     let deviations = Scaler::new(&mean, &x.std_axis(Axis(0), 0.0)).unwrap();
     for (links, bound) in [(false, 0.2), (true, 0.1)] {
         let params = ElmParams::new(100).direct_links(links).check().unwrap();
-        let layer = params.hidden_layer(51).unwrap();
-        let blown_up = params.fit_layer(Some(deviations.clone()), layer, &x, &t, None);
+        let layer = params.params().feature_map().draw(51).unwrap();
+        let map = FeatureMap::new(Some(deviations.clone()), layer, links).unwrap();
+        let blown_up = params.fit_map(map, &x, &t, None);
         let blown_up = rmse(&blown_up.unwrap(), &test, &truth);
         let error = rmse(&params.fit(&x, &t).unwrap(), &test, &truth);
         // 51 coefficients alone cost the noise of 0.22 times the root of 51 / 1000, 0.05.

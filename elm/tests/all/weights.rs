@@ -4,7 +4,9 @@ use crate::common::{normal, weights};
 use elm::prune::Keep;
 use elm::solve::{LeastSquares, PseudoInverse, Ridge, Solver};
 use elm::validate::Validator;
-use elm::{Accumulator, Activation, Biases, ElmParams, Neurons, Scalar, Scaler, ScalerBuilder};
+use elm::{
+    Accumulator, Activation, Biases, ElmParams, FeatureMap, Neurons, Scalar, Scaler, ScalerBuilder,
+};
 use ndarray::{Array1, Array2, Axis, s};
 use proptest::prelude::*;
 
@@ -68,10 +70,11 @@ fn every_route_omits_rows_of_no_weight<A: Scalar>(masked: &Masked<A>) {
         let ones = Array1::ones(x.nrows());
         let unweighted = params.fit_weighted(&x, &t, Some(ones.view()));
         assert_eq!(unweighted.unwrap(), params.fit(&x, &t).unwrap());
-        if let Ok(layer) = params.hidden_layer(3) {
+        if let Ok(layer) = params.params().feature_map().draw(3) {
+            let links = params.params().feature_map().neurons() < expected.beta().nrows();
+            let map = FeatureMap::new(Some(scaler.clone()), layer, links).unwrap();
             let fit = |x: &Array2<A>, t: &Array2<A>, w: &Array1<A>| {
-                let scaler = Some(scaler.clone());
-                params.fit_layer(scaler, layer.clone(), x, t, Some(w.view()))
+                params.fit_map(map.clone(), x, t, Some(w.view()))
             };
             assert_eq!(
                 fit(&masked.x, &masked.t, &masked.w).unwrap(),

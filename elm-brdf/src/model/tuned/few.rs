@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use super::finish::{Finished, Problem};
 use super::many::row_weights;
 use super::moments::Moments;
-use super::{Blank, NOISY, Tuned, better, model_of};
+use super::{Drawn, NOISY, Tuned, better, model_of};
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::geometry::Pair;
@@ -203,8 +203,8 @@ impl<'a> Search<'a> {
     /// The hidden-layer matrix of a candidate at the rows of the search.
     fn hidden(&self, set: &Set, candidate: usize) -> Result<Array2<f64>> {
         let params = self.params(set, candidate, SEARCH_NEURONS);
-        let blank = Blank::new(params, set.part.ncols(), &set.scaler)?;
-        blank.matrix(&set.part)
+        let drawn = Drawn::new(&params, set.part.ncols(), &set.scaler)?;
+        Ok(drawn.map.transform(&set.part)?)
     }
 
     /// The standard deviation of the noise of each channel's dark half, in 1/sr: of what its best
@@ -278,13 +278,13 @@ impl<'a> Search<'a> {
         };
         let neurons = tuned.size(NEURONS, set.x.nrows(), inputs, channels.len(), members)?;
         let members = members.min(neurons);
-        let blanks = set.ranked(channels).into_iter().take(members).enumerate();
-        let blanks = blanks.map(|(member, (_, candidate))| {
+        let ranked = set.ranked(channels).into_iter().take(members).enumerate();
+        let drawn = ranked.map(|(member, (_, candidate))| {
             let share = (neurons + member) / members;
-            Blank::new(self.params(set, candidate, share), inputs, &set.scaler)
+            Drawn::new(&self.params(set, candidate, share), inputs, &set.scaler)
         });
-        let blanks: Vec<Blank> = blanks.collect::<Result<_>>()?;
-        problem.finish(set.features, &set.scaler, &blanks, &set.x)
+        let drawn: Vec<Drawn> = drawn.collect::<Result<_>>()?;
+        problem.finish(set.features, &set.scaler, &drawn, &set.x)
     }
 }
 

@@ -7,7 +7,7 @@
 //! network returns more light than it receives, and than its measurements do by their nearest
 //! neighbours, they count for more.
 
-use elm::{Elm, HiddenLayer, Scaler};
+use elm::{Elm, FeatureMap, HiddenLayer, Scaler};
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Slice};
 use rand::SeedableRng;
 use rand::seq::index;
@@ -19,7 +19,7 @@ use super::many::row_weights;
 use super::moments::{WEAKEST, Weights, rounding};
 use super::rows::{Pull, Rows, STRENGTHS, TILE};
 use super::survey::Survey;
-use super::{Blank, Tuned};
+use super::{Drawn, Tuned};
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::geometry::Pair;
@@ -122,33 +122,28 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// Fits the output weights of the layers of `blanks` together; `x` has the inputs of all rows.
+    /// Fits the output weights of the layers of `drawn` together; `x` has the inputs of all rows.
     pub(super) fn finish(
         &self,
         features: Features,
         scaler: &Scaler<f64>,
-        blanks: &[Blank],
+        drawn: &[Drawn],
         x: &Array2<f64>,
     ) -> Result<Finished> {
-        let layers = blanks.iter().map(|blank| blank.network.hidden().clone());
-        let hidden = HiddenLayer::joined(&layers.collect::<Vec<_>>())?;
-        let blank = super::without_weights(scaler, hidden.clone())?;
-        let reach = reach(&hidden);
-        let rows = Rows::new(self, &blank, x)?;
+        let layers = drawn.iter().map(|drawn| drawn.map.layer().clone());
+        let layer = HiddenLayer::joined(&layers.collect::<Vec<_>>())?;
+        let reach = reach(&layer);
+        let map = FeatureMap::new(Some(scaler.clone()), layer, false)?;
+        let rows = Rows::new(self, &map, x)?;
         let (strength, held_out) = self.strength(&rows, &reach, None, (2..STRENGTHS).step_by(2))?;
-        let at_anchors = blank.hidden_matrix(&features.compute(&self.anchors.pairs))?;
+        let at_anchors = map.transform(&features.compute(&self.anchors.pairs))?;
         let mut pull = Pull::new(self, at_anchors, &self.variances(&held_out));
         let mut best = None;
         for _ in 0..=STEPS {
             let near = rows.near(strength);
             let (strength, held_out) = self.strength(&rows, &reach, Some(&pull), near)?;
-            let weights = self.solve(&rows, &blank, x, strength, &pull)?;
-            let network = Elm::from_parts(
-                Some(scaler.clone()),
-                hidden.clone(),
-                weights.beta,
-                weights.intercept,
-            )?;
+            let weights = self.solve(&rows, &map, x, strength, &pull)?;
+            let network = Elm::from_parts(map.clone(), weights.beta, weights.intercept)?;
             let excess = self.survey.excess(self, features, &network)?;
             let better = |&(_, _, known): &(_, _, f64)| excess < known;
             if best.as_ref().is_none_or(better) {
@@ -162,7 +157,7 @@ impl<'a> Problem<'a> {
         let Some((network, held_out, excess)) = best else {
             return Err(no_fit());
         };
-        let draws = blanks.iter().map(|blank| blank.draw.clone()).collect();
+        let draws = drawn.iter().map(|drawn| drawn.draw.clone()).collect();
         Ok(Finished {
             features,
             layer: Layer::Drawn(draws),
@@ -360,7 +355,7 @@ impl<'a> Problem<'a> {
     fn solve(
         &self,
         rows: &Rows,
-        blank: &Elm<f64>,
+        map: &FeatureMap<f64>,
         x: &Array2<f64>,
         strength: f64,
         pull: &Pull,
@@ -378,7 +373,7 @@ impl<'a> Problem<'a> {
             let mut moved = rows.total.without_targets();
             for first in (0..x.nrows()).step_by(TILE) {
                 let tile = Slice::from(first..(first + TILE).min(x.nrows()));
-                let h = blank.hidden_matrix(&x.slice_axis(Axis(0), tile))?;
+                let h = map.transform(&x.slice_axis(Axis(0), tile))?;
                 let fitted = weights.apply(h.view());
                 let values = self.values.slice_axis(Axis(0), tile);
                 let means = self.link.to_values(fitted.clone())?;

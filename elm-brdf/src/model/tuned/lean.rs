@@ -2,14 +2,14 @@
 
 use elm::prune::Keep;
 use elm::solve::Ridge;
-use elm::{Activation, Biases, Distribution, ElmParams, Scaler};
+use elm::{Activation, Biases, CheckedParams, Distribution, ElmParams, Scaler};
 use ndarray::{Array2, ArrayView2, Axis};
 use rand::SeedableRng;
 use rand::seq::index;
 use rand_chacha::ChaCha8Rng;
 
 use super::many::{RIDGE, row_weights};
-use super::{Blank, provenance, without_weights};
+use super::{Drawn, provenance};
 use crate::brdf::{Brdf, Fit, check};
 use crate::error::Result;
 use crate::features::Features;
@@ -155,16 +155,15 @@ impl Lean {
             }
         }
         let Found {
-            blank, held_out, ..
+            drawn, held_out, ..
         } = best;
         let weights = row_weights(self.metric, pairs, values, &link);
         let weights = weights.as_ref().map(|weights| weights.view());
-        let hidden = blank.network.hidden().clone();
-        let params = blank.draw.params.clone().solver(search.ridge).check()?;
-        let network = params.fit_layer(Some(scaler.clone()), hidden, &x, &targets, weights)?;
+        let params = search.solve()?;
+        let network = params.fit_map(drawn.map, &x, &targets, weights)?;
         let mut about = provenance(self.seed, self.metric, pairs, values);
         about.held_out = Some(held_out);
-        let layer = Layer::Drawn(vec![blank.draw]);
+        let layer = Layer::Drawn(vec![drawn.draw]);
         Ok(BrdfModel::new(self.features, link, layer, network).with_provenance(about))
     }
 }
@@ -193,7 +192,7 @@ fn select(pairs: &[Pair], rows: &[usize]) -> Vec<Pair> {
 struct Found {
     scales: Vec<f64>,
     bias: f64,
-    blank: Blank,
+    drawn: Drawn,
     held_out: Metrics,
     error: f64,
 }
@@ -215,54 +214,42 @@ struct Judge {
 }
 
 impl Search<'_> {
+    /// How output weights are found. Directions are bounded by themselves.
+    fn solve(&self) -> Result<CheckedParams<f64>> {
+        let params = ElmParams::new(self.lean.neurons).bounded(false);
+        Ok(params.solver(self.ridge).check()?)
+    }
+
     fn try_scales(&self, scales: Vec<f64>, bias: f64, judge: &Judge) -> Result<Found> {
         let neurons = self.lean.neurons;
-        let drawn = if self.lean.pruned {
+        let count = if self.lean.pruned {
             neurons.max((DRAWN * neurons).min(MOST_DRAWN.max(neurons + neurons / 2)))
         } else {
             neurons
         };
-        let params = ElmParams::new(drawn)
+        let params = ElmParams::new(count)
             .activation(self.lean.activation.clone())
             .distribution(Distribution::Normal)
             .input_scales(scales.clone())
             .biases(Biases::Scaled(bias))
-            .bounded(false)
             .seed(self.lean.seed);
-        let mut blank = Blank::new(params.clone(), scales.len(), self.scaler)?;
-        let params = params.solver(self.ridge).check()?;
+        let mut drawn = Drawn::new(&params, scales.len(), self.scaler)?;
+        let params = self.solve()?;
         let weights = self.weights.as_ref().map(|weights| weights.view());
-        if drawn > neurons {
+        if count > neurons {
             let keep = Keep::Neurons(neurons);
-            let pruned = params.prune_layer(
-                Some(self.scaler.clone()),
-                blank.network.hidden().clone(),
-                &self.x,
-                &self.targets,
-                keep,
-                weights,
-            )?;
-            let mut kept = vec![false; drawn];
-            for &number in &pruned.kept {
-                kept[number] = true;
-            }
-            blank.draw.kept = Some(kept);
-            let hidden = blank.network.hidden().subset(&pruned.kept)?;
-            blank.network = without_weights(self.scaler, hidden)?;
+            let map = drawn.map.clone();
+            let pruned = params.prune_map(map, &self.x, &self.targets, keep, weights)?;
+            drawn = drawn.pruned(&pruned.kept)?;
         }
-        let network = params.fit_layer(
-            Some(self.scaler.clone()),
-            blank.network.hidden().clone(),
-            &self.x,
-            &self.targets,
-            weights,
-        )?;
+        let map = drawn.map.clone();
+        let network = params.fit_map(map, &self.x, &self.targets, weights)?;
         let predicted = self.link.to_values(network.predict(&judge.x)?)?;
         let held_out = Metrics::of(&judge.pairs, predicted.view(), judge.values.view())?;
         Ok(Found {
             scales,
             bias,
-            blank,
+            drawn,
             error: self.lean.metric.of(&held_out),
             held_out,
         })

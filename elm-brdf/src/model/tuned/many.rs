@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::few::dark_noise;
 use super::finish::{Finished, Problem, cut_off_means, geometric_root};
-use super::{Blank, NOISY, TIE, Tuned, better, model_of, without_weights};
+use super::{Drawn, NOISY, TIE, Tuned, better, model_of};
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::geometry::Pair;
@@ -97,24 +97,18 @@ fn finished(problem: &Problem<'_>, setting: &Setting, rows: &[usize]) -> Result<
     let count = drawn(neurons);
     let few = &rows[..rows.len().min(PRUNE_ROWS.max(count))];
     let params = tuned.waves(count, &setting.scales);
-    let mut blank = Blank::new(params.clone(), x.ncols(), &scaler)?;
+    let layer = Drawn::new(&params, x.ncols(), &scaler)?;
     let params = params.solver(Ridge::relative(RIDGE)).check()?;
     let few_weights = problem.weights(few);
-    let pruned = params.prune_layer(
-        Some(scaler.clone()),
-        blank.network.hidden().clone(),
+    let pruned = params.prune_map(
+        layer.map.clone(),
         &x.select(Axis(0), few),
         &problem.targets(few),
         Keep::Neurons(neurons),
         few_weights.as_ref().map(|weights| weights.view()),
     )?;
-    let mut kept = vec![false; count];
-    for &number in &pruned.kept {
-        kept[number] = true;
-    }
-    blank.draw.kept = Some(kept);
-    blank.network = without_weights(&scaler, blank.network.hidden().subset(&pruned.kept)?)?;
-    problem.finish(setting.set, &scaler, &[blank], &x)
+    let layer = layer.pruned(&pruned.kept)?;
+    problem.finish(setting.set, &scaler, &[layer], &x)
 }
 
 /// What an error of a row's target is in the metric: to first order
@@ -279,14 +273,9 @@ impl<'a> Search<'a> {
 
     fn try_scales(&self, inputs: &Inputs, scales: Vec<f64>) -> Result<Setting> {
         let params = self.tuned.waves(SEARCH_NEURONS, &scales);
+        let map = Drawn::new(&params, scales.len(), &inputs.scaler)?.map;
         let params = params.solver(Ridge::relative(RIDGE)).check()?;
-        let network = params.fit_layer(
-            Some(inputs.scaler.clone()),
-            params.hidden_layer(scales.len())?,
-            &inputs.fitted,
-            &self.fitted.targets,
-            None,
-        )?;
+        let network = params.fit_map(map, &inputs.fitted, &self.fitted.targets, None)?;
         let targets = network.predict(&inputs.judged)?;
         let predicted = self.link.to_values(targets.clone())?;
         Ok(Setting {

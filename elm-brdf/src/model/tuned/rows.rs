@@ -1,6 +1,6 @@
 //! A layer at the rows and at the anchors of a problem, as sums of products.
 
-use elm::Elm;
+use elm::FeatureMap;
 use ndarray::{Array1, Array2, ArrayView2, Axis, Slice};
 
 use super::finish::{Problem, no_fit};
@@ -25,8 +25,12 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    pub(super) fn new(problem: &Problem<'_>, blank: &Elm<f64>, x: &Array2<f64>) -> Result<Self> {
-        let judged = blank.hidden_matrix(&x.select(Axis(0), problem.judged()))?;
+    pub(super) fn new(
+        problem: &Problem<'_>,
+        map: &FeatureMap<f64>,
+        x: &Array2<f64>,
+    ) -> Result<Self> {
+        let judged = map.transform(&x.select(Axis(0), problem.judged()))?;
         let of = |h: ArrayView2<'_, f64>, rows: &[usize]| {
             Moments::of(
                 h,
@@ -50,7 +54,7 @@ impl Rows {
         }
         let rest: Vec<usize> = (0..x.nrows()).filter(|&row| !is_judged[row]).collect();
         for tile in rest.chunks(TILE) {
-            let h = blank.hidden_matrix(&x.select(Axis(0), tile))?;
+            let h = map.transform(&x.select(Axis(0), tile))?;
             total.add(&of(h.view(), tile), 1.0);
         }
         Ok(Self {

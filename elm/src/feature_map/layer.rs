@@ -3,22 +3,15 @@
 //!
 //! That matrix is the paper's $F$; most of the literature, and this crate, call it $H$.
 
-mod distance;
-mod draw;
-mod gradient;
-#[cfg(test)]
-mod tests;
-
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut2, Axis, s};
 use serde::{Deserialize, Serialize};
 
+use super::distance;
+use super::params::Kind;
 use crate::activation::Activation;
 use crate::check::{check_length, check_matrix};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
-
-pub use draw::{Biases, Distribution, Kind, Neurons};
-pub(crate) use draw::{Inputs, Plan};
 
 /// The random hidden layer of a network: it is drawn, never trained.
 ///
@@ -31,21 +24,21 @@ pub(crate) use draw::{Inputs, Plan};
 #[serde(bound = "")]
 pub struct HiddenLayer<A: Scalar> {
     /// Shape (inputs, neurons).
-    weights: Array2<A>,
+    pub(super) weights: Array2<A>,
     /// Shape (neurons).
-    biases: Array1<A>,
+    pub(super) biases: Array1<A>,
     /// In the order of the neurons.
-    groups: Vec<Group<A>>,
+    pub(super) groups: Vec<Group<A>>,
 }
 
 /// Neurons of a layer that stand side by side and have one function.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct Group<A: Scalar> {
-    neurons: usize,
-    activation: Activation<A>,
+    pub(super) neurons: usize,
+    pub(super) activation: Activation<A>,
     /// What radial neurons multiply the inputs by.
-    radial: Option<Array1<A>>,
+    pub(super) radial: Option<Array1<A>>,
 }
 
 impl<A: Scalar> Group<A> {

@@ -1,18 +1,18 @@
-use super::*;
-use ndarray::{array, s};
+use ndarray::{Array1, array, s};
 
-fn plan<A: Scalar>(neurons: usize, seed: u64) -> Plan<A> {
-    Plan {
-        groups: vec![Neurons::new(neurons, Activation::Tanh)],
-        distribution: Distribution::Uniform,
-        scale: 1.0,
-        input_scales: Vec::new(),
+use super::*;
+use crate::activation::Activation;
+
+fn plan<A: Scalar>(neurons: usize, seed: u64) -> FeatureMapParams<A> {
+    FeatureMapParams {
+        neurons: Neurons::new(neurons, Activation::Tanh),
         seed,
+        ..FeatureMapParams::new(0)
     }
 }
 
 fn draw(neurons: usize, seed: u64) -> HiddenLayer<f64> {
-    plan(neurons, seed).draw(array![[0.5, -1.0, 2.0]].view(), None)
+    plan(neurons, seed).sample(array![[0.5, -1.0, 2.0]].view(), None)
 }
 
 #[test]
@@ -39,11 +39,11 @@ fn a_small_layer_is_the_beginning_of_a_larger_one() {
 }
 
 /// Tanh, sine with its biases on the data, and radial neurons.
-fn mixed<A: Scalar>(counts: [usize; 3], seed: u64) -> Plan<A> {
+fn mixed<A: Scalar>(counts: [usize; 3], seed: u64) -> FeatureMapParams<A> {
     let [tanh, sine, radial] = counts;
-    Plan {
-        groups: vec![
-            Neurons::new(tanh, Activation::Tanh),
+    FeatureMapParams {
+        neurons: Neurons::new(tanh, Activation::Tanh),
+        others: vec![
             Neurons::new(sine, Activation::Sine)
                 .scale(2.0)
                 .biases(Biases::OnData),
@@ -63,8 +63,8 @@ fn rows() -> Array2<f64> {
 #[test]
 fn in_a_mixed_layer_each_group_is_the_beginning_of_a_larger_one_whatever_the_others() {
     let x = rows();
-    let small = mixed::<f64>([4, 3, 9], 5).draw(x.view(), None);
-    let large = mixed::<f64>([6, 8, 31], 5).draw(x.view(), None);
+    let small = mixed::<f64>([4, 3, 9], 5).sample(x.view(), None);
+    let large = mixed::<f64>([6, 8, 31], 5).sample(x.view(), None);
     for (few, from, to) in [(4, 0, 0), (3, 4, 6), (9, 7, 14)] {
         let (few_from, few_to) = (s![.., from..from + few], s![.., to..to + few]);
         assert_eq!(small.weights.slice(few_from), large.weights.slice(few_to));
@@ -72,12 +72,13 @@ fn in_a_mixed_layer_each_group_is_the_beginning_of_a_larger_one_whatever_the_oth
         assert_eq!(small.biases.slice(few_from), large.biases.slice(few_to));
     }
     // The first group is a plain layer.
-    let plain = Plan {
-        groups: vec![Neurons::new(4, Activation::Tanh)],
+    let plain = FeatureMapParams {
+        neurons: Neurons::new(4, Activation::Tanh),
+        others: Vec::new(),
         ..mixed::<f64>([0; 3], 5)
     };
     assert_eq!(
-        plain.draw(x.view(), None).weights,
+        plain.sample(x.view(), None).weights,
         small.weights.slice(s![.., ..4])
     );
 }
@@ -85,13 +86,13 @@ fn in_a_mixed_layer_each_group_is_the_beginning_of_a_larger_one_whatever_the_oth
 #[test]
 fn centres_are_scaled_rows_and_none_comes_twice_before_all_have_come_once() {
     let x = rows();
-    let plan = Plan {
-        groups: vec![Neurons::radial(30).scale(3.0)],
+    let plan = FeatureMapParams {
+        neurons: Neurons::radial(30).scale(3.0),
         scale: 0.5,
         input_scales: vec![1.0, 0.25],
         ..plan::<f64>(0, 2)
     };
-    let layer = plan.draw(x.view(), None);
+    let layer = plan.sample(x.view(), None);
     let scaled = &x * &array![1.5, 0.375];
     let mut uses = vec![0; x.nrows()];
     for centre in layer.weights.columns() {
@@ -110,11 +111,11 @@ fn f32_is_the_rounded_f64_layer() {
         if normal {
             single.distribution = Distribution::Normal;
             double.distribution = Distribution::Normal;
-            single.groups[0].biases = Biases::Scaled(2.0);
-            double.groups[0].biases = Biases::Scaled(2.0);
+            single.neurons.biases = Biases::Scaled(2.0);
+            double.neurons.biases = Biases::Scaled(2.0);
         }
-        let single = single.draw(x.mapv(|x| x as f32).view(), None);
-        let double: HiddenLayer<f64> = double.draw(x.view(), None);
+        let single = single.sample(x.mapv(|x| x as f32).view(), None);
+        let double: HiddenLayer<f64> = double.sample(x.view(), None);
         let (drawn, centres) = (s![.., ..5], s![.., 5..]);
         let rounded = double.weights.mapv(|w| w as f32);
         assert_eq!(single.weights.slice(drawn), rounded.slice(drawn));
@@ -131,12 +132,12 @@ fn f32_is_the_rounded_f64_layer() {
 #[test]
 fn biases_on_data_put_every_neuron_at_a_row() {
     let x = array![[0.5, -1.0], [3.0, 0.25], [-2.0, 8.0]];
-    let plan = Plan {
-        groups: vec![Neurons::new(20, Activation::Tanh).biases(Biases::OnData)],
+    let plan = FeatureMapParams {
+        neurons: Neurons::new(20, Activation::Tanh).biases(Biases::OnData),
         scale: 50.0,
         ..plan(20, 4)
     };
-    let layer = plan.draw(x.view(), None);
+    let layer = plan.sample(x.view(), None);
     let z = x.dot(&layer.weights) + &layer.biases;
     for column in z.columns() {
         assert!(column.iter().any(|z: &f64| z.abs() < 1e-12), "{column}");
@@ -146,12 +147,12 @@ fn biases_on_data_put_every_neuron_at_a_row() {
 #[test]
 fn input_scales_multiply_the_weights_of_their_input() {
     let x = array![[0.5, -1.0]];
-    let scaled = Plan {
+    let scaled = FeatureMapParams {
         input_scales: vec![1.0, 0.0],
         ..plan(3, 1)
     };
-    let layer = scaled.draw(x.view(), None);
-    let whole = plan::<f64>(3, 1).draw(x.view(), None);
+    let layer = scaled.sample(x.view(), None);
+    let whole = plan::<f64>(3, 1).sample(x.view(), None);
     assert_eq!(layer.weights.row(0), whole.weights.row(0));
     assert_eq!(layer.weights.row(1).sum(), 0.0);
 }
@@ -172,7 +173,7 @@ fn the_forward_pass_is_equation_7() {
 #[test]
 fn a_mixed_layer_is_its_groups_side_by_side_and_radial_neurons_are_bumps_at_their_rows() {
     let x = rows();
-    let layer = mixed::<f64>([4, 3, 20], 1).draw(x.view(), None);
+    let layer = mixed::<f64>([4, 3, 20], 1).sample(x.view(), None);
     let h = layer.forward(x.view());
     for (i, row) in x.rows().into_iter().enumerate() {
         for k in 0..27 {
@@ -204,11 +205,11 @@ fn a_distance_keeps_its_digits_far_from_the_origin() {
     // Rows 1e6 from the origin and about 1 apart, in f64 exact: 20 bits of whole numbers and
     // eighths. The product form would lose 1e12 of 1e16.
     let x = Array2::from_shape_fn((9, 3), |(i, j)| 1e6 + ((5 * i + 3 * j) % 11) as f64 / 8.0);
-    let plan = Plan {
-        groups: vec![Neurons::radial(9).kind(Kind::Radial)],
+    let plan = FeatureMapParams {
+        neurons: Neurons::radial(9).kind(Kind::Radial),
         ..plan::<f64>(0, 3)
     };
-    let layer = plan.draw(x.view(), None);
+    let layer = plan.sample(x.view(), None);
     let z = distance::distances(x.view(), layer.weights.view());
     for ((i, k), z) in z.indexed_iter() {
         let apart = &x.row(i) - &layer.weights.column(k);
@@ -224,8 +225,8 @@ fn student_t_weights_have_their_variance_and_a_root_in_common() {
     let draw = |count| {
         let mut plan = plan::<f64>(count, 4);
         plan.distribution = Distribution::StudentT(5);
-        plan.groups[0].biases = Biases::Scaled(1.0);
-        plan.draw(x.view(), None)
+        plan.neurons.biases = Biases::Scaled(1.0);
+        plan.sample(x.view(), None)
     };
     let layer = draw(40_000);
     let squares = layer.weights.mapv(|w| w * w);
@@ -248,15 +249,13 @@ fn student_t_weights_have_their_variance_and_a_root_in_common() {
 fn gradients_are_those_of_the_weighted_sum() {
     // Central differences of squares are exact.
     let square = Activation::custom("square", |z: f64| z * z);
-    let layer = Plan {
-        groups: vec![
-            Neurons::new(4, square.clone()),
-            Neurons::new(5, square).kind(Kind::Radial).scale(0.3),
-        ],
+    let layer = FeatureMapParams {
+        neurons: Neurons::new(4, square.clone()),
+        others: vec![Neurons::new(5, square).kind(Kind::Radial).scale(0.3)],
         input_scales: vec![1.0, 0.25],
         ..plan(0, 5)
     }
-    .draw(rows().view(), None);
+    .sample(rows().view(), None);
     // Away from the centres, which lie on rows.
     let x = rows() + 3.0;
     let beta = Array1::from_shape_fn(9, |k| (k as f64).cos());

@@ -2,37 +2,37 @@
 
 use ndarray::ArrayView2;
 
+use super::layer::{Group, HiddenLayer};
 use crate::activation::Activation;
-use crate::hidden::{Group, HiddenLayer};
 use crate::scalar::Scalar;
 use crate::simd::{Aligned, zeros};
 
 /// Panels in a chunk. A chunk of hidden values for a tile of rows fits the first-level cache.
-pub(super) const CHUNK_PANELS: usize = 16;
+pub(crate) const CHUNK_PANELS: usize = 16;
 
 /// Panels of neurons that have one function.
 #[derive(Debug, Clone)]
-pub(super) struct Panels<A: Scalar> {
-    pub(super) first: usize,
-    pub(super) count: usize,
-    pub(super) neurons: usize,
-    pub(super) activation: Activation<A>,
+pub(crate) struct Panels<A: Scalar> {
+    pub(crate) first: usize,
+    pub(crate) count: usize,
+    pub(crate) neurons: usize,
+    pub(crate) activation: Activation<A>,
     /// What radial neurons multiply the inputs by.
-    pub(super) radial: Option<Vec<A>>,
+    pub(crate) radial: Option<Vec<A>>,
 }
 
 /// Weights by panel: as many neurons as there are values in a cache line, whatever the vector
 /// unit. The last panel of each group is filled up with neurons of weight 0.
 #[derive(Debug, Clone)]
-pub(super) struct Packed<A: Scalar> {
-    pub(super) inputs: usize,
-    pub(super) neurons: usize,
-    pub(super) outputs: usize,
+pub(crate) struct Packed<A: Scalar> {
+    pub(crate) inputs: usize,
+    pub(crate) neurons: usize,
+    pub(crate) outputs: usize,
     /// Panels of neurons, and of inputs that reach the outputs directly.
-    pub(super) panels: usize,
-    pub(super) link_panels: usize,
+    pub(crate) panels: usize,
+    pub(crate) link_panels: usize,
     /// The panels of neurons by function.
-    pub(super) groups: Vec<Panels<A>>,
+    pub(crate) groups: Vec<Panels<A>>,
     /// Per panel one line of biases, then a line of weights for each input.
     hidden: Aligned<A>,
     /// Per output one line for each panel of neurons, then for each panel of direct links.
@@ -50,12 +50,15 @@ impl<A: Scalar> Panels<A> {
         }
     }
 
-    /// Of the neurons in a chunk of these panels how many there really are, where those that only
-    /// fill up the last panel must be kept apart: a user's function need not be finite at 0, and
-    /// a distance may overflow.
+    /// Number of real neurons, not padding, in a chunk of these panels.
+    pub(super) fn real(&self, first: usize, count: usize) -> usize {
+        (count * A::LINE).min(self.neurons - (first - self.first) * A::LINE)
+    }
+
+    /// Number of real neurons in a chunk of these panels where padding needs a treatment of its own: a
+    /// user's function need not be finite at 0, and a distance may overflow.
     pub(super) fn used(&self, first: usize, count: usize) -> Option<usize> {
-        let all = count * A::LINE;
-        let used = all.min(self.neurons - (first - self.first) * A::LINE);
+        let (all, used) = (count * A::LINE, self.real(first, count));
         let apart = self.radial.is_some() || matches!(self.activation, Activation::Custom(_));
         (apart && used < all).then_some(used)
     }
@@ -63,7 +66,7 @@ impl<A: Scalar> Panels<A> {
 
 impl<A: Scalar> Packed<A> {
     /// `beta` has shape (neurons, or neurons + inputs with direct links; outputs).
-    pub(super) fn new(layer: &HiddenLayer<A>, beta: ArrayView2<'_, A>) -> Self {
+    pub(crate) fn new(layer: &HiddenLayer<A>, beta: ArrayView2<'_, A>) -> Self {
         let (inputs, neurons) = layer.weights().dim();
         let links = beta.nrows().saturating_sub(neurons);
         let link_panels = links.div_ceil(A::LINE);
@@ -120,7 +123,7 @@ impl<A: Scalar> Packed<A> {
     }
 
     /// Biases and weights of a range of panels.
-    pub(super) fn hidden(&self, first: usize, count: usize) -> &[A] {
+    pub(crate) fn hidden(&self, first: usize, count: usize) -> &[A] {
         let length = (self.inputs + 1) * A::LINE;
         self.hidden
             .get(first * length..(first + count) * length)
@@ -128,7 +131,7 @@ impl<A: Scalar> Packed<A> {
     }
 
     /// Output weights of a range of panels, links counted after neurons.
-    pub(super) fn beta(&self, output: usize, first: usize, count: usize) -> &[A] {
+    pub(crate) fn beta(&self, output: usize, first: usize, count: usize) -> &[A] {
         let start = (output * (self.panels + self.link_panels) + first) * A::LINE;
         self.beta
             .get(start..start + count * A::LINE)

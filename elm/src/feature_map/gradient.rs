@@ -2,7 +2,8 @@
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
 
-use super::{Group, HiddenLayer, distance};
+use super::distance;
+use super::layer::{Group, HiddenLayer};
 use crate::scalar::Scalar;
 
 /// The step that differences of activation functions are taken over, in units of what a step of one

@@ -11,13 +11,13 @@ use crate::scalar::Scalar;
 use crate::simd::Lanes;
 
 /// Rows whose weighted sums are taken together, one register each.
-pub(super) const ROWS: usize = 8;
+pub(crate) const ROWS: usize = 8;
 
 /// Panels whose weighted sums are taken together for a row by itself.
 const PANELS: usize = 4;
 
 /// Splits a count of rows into blocks of [`ROWS`] and single ones: (first row, rows).
-pub(super) fn row_blocks(rows: usize) -> impl Iterator<Item = (usize, usize)> {
+pub(crate) fn row_blocks(rows: usize) -> impl Iterator<Item = (usize, usize)> {
     let whole = rows / ROWS * ROWS;
     (0..whole)
         .step_by(ROWS)
@@ -27,16 +27,16 @@ pub(super) fn row_blocks(rows: usize) -> impl Iterator<Item = (usize, usize)> {
 
 /// Weighted sums $x \cdot \omega_k + b_k$ of a range of panels for a tile of rows; or, of radial
 /// neurons, the distances $\lVert x - \omega_k \rVert$.
-pub(super) struct Project<'a, A: Scalar> {
-    pub(super) packed: &'a Packed<A>,
-    pub(super) first_panel: usize,
-    pub(super) panels: usize,
-    pub(super) rows: usize,
-    pub(super) radial: bool,
+pub(crate) struct Project<'a, A: Scalar> {
+    pub(crate) packed: &'a Packed<A>,
+    pub(crate) first_panel: usize,
+    pub(crate) panels: usize,
+    pub(crate) rows: usize,
+    pub(crate) radial: bool,
     /// Inputs by [`row_blocks`], and in a block input by input.
-    pub(super) inputs: &'a [A],
+    pub(crate) inputs: &'a [A],
     /// Receives `rows` rows of `panels` lines.
-    pub(super) hidden: &'a mut [A],
+    pub(crate) hidden: &'a mut [A],
 }
 
 impl<A: Scalar> WithSimd for Project<'_, A> {
@@ -142,14 +142,14 @@ fn project<S: Simd, A: Scalar, const RADIAL: bool, const R: usize, const P: usiz
 }
 
 /// Adds the contribution of a range of panels to every output: $\beta^T h$, still in lanes.
-pub(super) struct Accumulate<'a, A: Scalar> {
-    pub(super) packed: &'a Packed<A>,
-    pub(super) first_panel: usize,
-    pub(super) panels: usize,
+pub(crate) struct Accumulate<'a, A: Scalar> {
+    pub(crate) packed: &'a Packed<A>,
+    pub(crate) first_panel: usize,
+    pub(crate) panels: usize,
     /// Rows of `panels` lines.
-    pub(super) hidden: &'a [A],
+    pub(crate) hidden: &'a [A],
     /// Per row a line for each output.
-    pub(super) sums: &'a mut [A],
+    pub(crate) sums: &'a mut [A],
 }
 
 impl<A: Scalar> WithSimd for Accumulate<'_, A> {
@@ -234,7 +234,7 @@ fn accumulate<S: Simd, A: Scalar, const R: usize, const O: usize>(
 
 /// The sum of a line, halves added to each other.
 #[inline]
-pub(super) fn sum_of_line<A: Scalar>(line: &[A]) -> A {
+pub(crate) fn sum_of_line<A: Scalar>(line: &[A]) -> A {
     // 16 values of f32 or 8 of f64 in 64 bytes.
     let mut buffer = [A::zero(); 16];
     for (to, &from) in buffer.iter_mut().zip(line) {

@@ -4,9 +4,6 @@
 //! the activation function applied, and the products with the output weights added up, while
 //! everything stays in the first-level cache. The hidden-layer matrix never exists as a whole.
 
-mod kernels;
-mod layer;
-mod packed;
 #[cfg(test)]
 mod tests;
 
@@ -15,18 +12,13 @@ use ndarray::{Array2, ArrayRef2, ArrayView2, ArrayViewMut2, Axis, aview_mut1, av
 use crate::activation::Accuracy;
 use crate::check::check_length;
 use crate::error::{Error, Result};
+use crate::feature_map::{
+    Accumulate, CHUNK_PANELS, PackedMap, TILE_ROWS, TileBuffers, sum_of_line, tile_rows,
+};
 use crate::memory::check_room;
 use crate::network::Elm;
 use crate::scalar::Scalar;
-use crate::scaler::Scaler;
-use crate::simd::{Aligned, Level, zeros};
-use kernels::{Accumulate, Project, row_blocks, sum_of_line};
-use packed::{CHUNK_PANELS, Packed, Panels};
-
-pub(crate) use layer::LayerRows;
-
-/// Rows evaluated together.
-const TILE_ROWS: usize = 16;
+use crate::simd::{Aligned, zeros};
 
 /// A fitted network packed for evaluation; made by [`Elm::predictor`].
 ///
@@ -57,14 +49,10 @@ const TILE_ROWS: usize = 16;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Predictor<A: Scalar> {
-    packed: Packed<A>,
-    scaler: Option<Scaler<A>>,
+    map: PackedMap<A>,
     intercept: Vec<A>,
-    /// What each input is held between, and each output; empty where they are not.
-    input_bounds: Vec<(A, A)>,
+    /// What each output is held between; empty where they are not.
     output_bounds: Vec<(A, A)>,
-    accuracy: Accuracy,
-    level: Level,
 }
 
 /// Working memory of a [`Predictor`], some tens of kilobytes; made by [`Predictor::scratch`].
@@ -72,12 +60,7 @@ pub struct Predictor<A: Scalar> {
 /// Each thread that predicts needs one of its own.
 #[derive(Debug, Clone)]
 pub struct Scratch<A: Scalar> {
-    /// A tile of inputs, standardised, as [`Project`] wants them.
-    inputs: Aligned<A>,
-    /// The same, multiplied by the scales of a group of radial neurons.
-    scaled: Aligned<A>,
-    /// A tile of one chunk of the hidden layer.
-    hidden: Aligned<A>,
+    tile: TileBuffers<A>,
     /// A tile of sums, a line for each output.
     sums: Aligned<A>,
 }
@@ -93,72 +76,57 @@ impl<A: Scalar> Predictor<A> {
             let (least, greatest) = bounds.predictions();
             least.into_iter().zip(greatest)
         });
+        let input_bounds = inputs.into_iter().flatten().collect();
         Self {
-            packed: Packed::new(model.hidden(), model.beta()),
-            scaler: model.scaler().cloned(),
+            map: PackedMap::new(model.map(), model.beta(), input_bounds),
             intercept: model.intercept().to_vec(),
-            input_bounds: inputs.into_iter().flatten().collect(),
             output_bounds: outputs.into_iter().flatten().collect(),
-            accuracy: Accuracy::Full,
-            level: Level::best(),
         }
     }
 
     /// How exactly activation functions are evaluated; [`Accuracy::Full`] unless set.
     #[must_use]
     pub fn accuracy(mut self, accuracy: Accuracy) -> Self {
-        self.accuracy = accuracy;
+        self.map.accuracy = accuracy;
         self
     }
 
     /// On this vector unit.
     #[cfg(test)]
-    fn level(mut self, level: Level) -> Self {
-        self.level = level;
+    fn level(mut self, level: crate::simd::Level) -> Self {
+        self.map.level = level;
         self
     }
 
     /// Number of inputs.
     #[must_use]
     pub fn inputs(&self) -> usize {
-        self.packed.inputs
+        self.map.packed.inputs
     }
 
     /// Number of hidden neurons.
     #[must_use]
     pub fn neurons(&self) -> usize {
-        self.packed.neurons
+        self.map.packed.neurons
     }
 
     /// Number of outputs.
     #[must_use]
     pub fn outputs(&self) -> usize {
-        self.packed.outputs
+        self.map.packed.outputs
     }
 
     /// Working memory for this network.
     #[must_use]
     pub fn scratch(&self) -> Scratch<A> {
-        let [inputs, scaled, hidden, sums] = self.scratch_lengths();
         Scratch {
-            inputs: zeros(inputs),
-            scaled: zeros(scaled),
-            hidden: zeros(hidden),
-            sums: zeros(sums),
+            tile: self.map.buffers(),
+            sums: zeros(self.sums_length()),
         }
     }
 
-    fn scratch_lengths(&self) -> [usize; 4] {
-        let groups = &self.packed.groups;
-        let neurons = groups.iter().map(|group| group.count);
-        let panels = neurons.chain([self.packed.link_panels]).max().unwrap_or(0);
-        let radial = groups.iter().any(|group| group.radial.is_some());
-        [
-            TILE_ROWS * self.inputs(),
-            if radial { TILE_ROWS * self.inputs() } else { 0 },
-            TILE_ROWS * panels.min(CHUNK_PANELS) * A::LINE,
-            TILE_ROWS * self.outputs() * A::LINE,
-        ]
+    fn sums_length(&self) -> usize {
+        TILE_ROWS * self.outputs() * A::LINE
     }
 
     /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs), any strides.
@@ -186,14 +154,10 @@ impl<A: Scalar> Predictor<A> {
         scratch: &mut Scratch<A>,
     ) -> Result<()> {
         self.check(x, out)?;
-        let parts = [
-            &scratch.inputs,
-            &scratch.scaled,
-            &scratch.hidden,
-            &scratch.sums,
-        ];
-        let lengths = parts.map(|part| part.as_slice().len());
-        for (found, expected) in lengths.into_iter().zip(self.scratch_lengths()) {
+        let found = scratch.tile.lengths().into_iter();
+        let found = found.chain([scratch.sums.as_slice().len()]);
+        let expected = self.map.lengths().into_iter().chain([self.sums_length()]);
+        for (found, expected) in found.zip(expected) {
             check_length("scratch", found, expected)?;
         }
         self.tiles(x.view(), out.view_mut(), 0, scratch)
@@ -265,49 +229,24 @@ impl<A: Scalar> Predictor<A> {
         offset: usize,
         scratch: &mut Scratch<A>,
     ) -> Result<()> {
-        let (rows, packed) = (x.nrows(), &self.packed);
-        let inputs = &mut scratch.inputs[..rows * packed.inputs];
-        self.standardise(x, inputs, offset)?;
+        let (rows, packed, level) = (x.nrows(), &self.map.packed, self.map.level);
         let sums = &mut scratch.sums[..rows * packed.outputs * A::LINE];
         sums.fill(A::zero());
-
-        for group in &packed.groups {
-            let inputs = match &group.radial {
-                None => &*inputs,
-                Some(scales) => {
-                    let scaled = &mut scratch.scaled[..rows * packed.inputs];
-                    multiply(inputs, scales, rows, scaled);
-                    &*scaled
-                }
-            };
-            let end = group.first + group.count;
-            for first_panel in (group.first..end).step_by(CHUNK_PANELS) {
-                let panels = CHUNK_PANELS.min(end - first_panel);
-                let hidden = &mut scratch.hidden[..rows * panels * A::LINE];
-                self.level.run(Project {
-                    packed,
-                    first_panel,
-                    panels,
-                    rows,
-                    radial: group.radial.is_some(),
-                    inputs,
-                    hidden,
-                });
-                self.activate(group, hidden, first_panel, panels);
-                self.level.run(Accumulate {
-                    packed,
-                    first_panel,
-                    panels,
-                    hidden,
-                    sums,
-                });
-            }
-        }
+        self.map.tile(x, offset, &mut scratch.tile, |chunk| {
+            level.run(Accumulate {
+                packed,
+                first_panel: chunk.first_panel,
+                panels: chunk.panels,
+                hidden: chunk.hidden,
+                sums,
+            });
+        })?;
+        let inputs = &scratch.tile.inputs[..rows * packed.inputs];
         for first in (0..packed.link_panels).step_by(CHUNK_PANELS) {
             let panels = CHUNK_PANELS.min(packed.link_panels - first);
-            let hidden = &mut scratch.hidden[..rows * panels * A::LINE];
+            let hidden = &mut scratch.tile.hidden[..rows * panels * A::LINE];
             link(inputs, packed.inputs, rows, first * A::LINE, hidden);
-            self.level.run(Accumulate {
+            level.run(Accumulate {
                 packed,
                 first_panel: packed.panels + first,
                 panels,
@@ -344,66 +283,6 @@ impl<A: Scalar> Predictor<A> {
             })
         }
     }
-
-    /// Copies a tile of inputs, standardised, into blocks of rows.
-    fn standardise(&self, x: ArrayView2<'_, A>, to: &mut [A], offset: usize) -> Result<()> {
-        let inputs = self.inputs();
-        let mut finite = true;
-        for (first, rows) in row_blocks(x.nrows()) {
-            let block = &mut to[first * inputs..(first + rows) * inputs];
-            for r in 0..rows {
-                let row = x.row(first + r);
-                let to = block.iter_mut().skip(r).step_by(rows);
-                for (to, &value) in to.zip(row) {
-                    finite &= value.is_finite();
-                    *to = value;
-                }
-            }
-            for (column, &(lower, upper)) in block.chunks_exact_mut(rows).zip(&self.input_bounds) {
-                column.iter_mut().for_each(|x| *x = x.max(lower).min(upper));
-            }
-            if let Some(scaler) = &self.scaler {
-                scaler.transform_columns(block.chunks_exact_mut(rows));
-            }
-        }
-        if finite {
-            return Ok(());
-        }
-        let place = x.indexed_iter().find(|(_, value)| !value.is_finite());
-        let (row, column) = place.map_or((0, 0), |(place, _)| place);
-        Err(Error::NotFinite {
-            what: "inputs",
-            row: offset + row,
-            column,
-        })
-    }
-
-    fn activate(&self, group: &Panels<A>, hidden: &mut [A], first_panel: usize, panels: usize) {
-        let apply = |values: &mut [A]| {
-            let function = &group.activation;
-            function.apply_to_slice(self.level, self.accuracy, values);
-        };
-        let Some(used) = group.used(first_panel, panels) else {
-            return apply(hidden);
-        };
-        for row in hidden.chunks_exact_mut(panels * A::LINE) {
-            let (neurons, filling) = row.split_at_mut(used);
-            apply(neurons);
-            filling.fill(A::zero());
-        }
-    }
-}
-
-/// Multiplies inputs, in blocks of rows, by the scale of each.
-fn multiply<A: Scalar>(inputs: &[A], scales: &[A], rows: usize, to: &mut [A]) {
-    for (first, block) in row_blocks(rows) {
-        let part = first * scales.len()..(first + block) * scales.len();
-        let from = inputs[part.clone()].chunks_exact(block);
-        let to = to[part].chunks_exact_mut(block);
-        for ((from, to), &scale) in from.zip(to).zip(scales) {
-            to.iter_mut().zip(from).for_each(|(to, &x)| *to = x * scale);
-        }
-    }
 }
 
 /// Copies inputs from `first` on as if they were hidden values, filled up with zeros.
@@ -414,19 +293,4 @@ fn link<A: Scalar>(x: &[A], inputs: usize, rows: usize, first: usize, hidden: &m
         let to = hidden.iter_mut().skip(row * length).take(length);
         to.zip(x.skip(first)).for_each(|(to, from)| *to = from);
     }
-}
-
-/// The rows of a tile of inputs, which lies in blocks of rows: (row, its inputs).
-fn tile_rows<A: Scalar>(
-    x: &[A],
-    inputs: usize,
-    rows: usize,
-) -> impl Iterator<Item = (usize, impl Iterator<Item = A>)> {
-    row_blocks(rows).flat_map(move |(first, block_rows)| {
-        let block = &x[first * inputs..(first + block_rows) * inputs];
-        (0..block_rows).map(move |r| {
-            let values = block.iter().skip(r).step_by(block_rows).copied();
-            (first + r, values)
-        })
-    })
 }
