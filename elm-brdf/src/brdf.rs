@@ -1,16 +1,16 @@
 //! What every reflectance model here can do, and what can make one from measurements.
 
+use std::any::Any;
+
 use ndarray::{Array2, ArrayView2, Axis};
 
-use crate::batch::Precision;
 use crate::error::{Error, Result};
 use crate::geometry::Pair;
-use crate::model::BrdfModel;
 
 /// A reflectance model, possibly of several channels, or of several materials side by side.
 ///
 /// The value of one pair does not depend on the other pairs of a batch, bit for bit.
-pub trait Brdf: Send + Sync {
+pub trait Brdf: Any + Send + Sync {
     /// Number of values per pair of directions.
     fn channels(&self) -> usize;
 
@@ -33,17 +33,6 @@ pub trait Brdf: Send + Sync {
     /// what its channels share.
     fn stored_floats(&self) -> usize {
         self.channels() * self.floats_per_channel()
-    }
-
-    /// The same model for [directions in columns](crate::batch), where it is packed for them.
-    fn by_columns(&self) -> Option<Precision<'_>> {
-        None
-    }
-
-    /// The model itself where it is a network, for what only a network can do, such as
-    /// [being exported](crate::export).
-    fn as_network(&self) -> Option<&BrdfModel> {
-        None
     }
 }
 

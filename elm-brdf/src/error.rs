@@ -34,10 +34,10 @@ pub enum Error {
     Fetch(#[from] crate::fetch::Error),
     /// A model could not be exported.
     #[error(transparent)]
-    Export(#[from] crate::export::ExportError),
+    Export(#[from] crate::export::error::ExportError),
     /// A scene could not be read or rendered.
     #[error(transparent)]
-    Scene(#[from] crate::render::SceneError),
+    Scene(#[from] crate::render::error::SceneError),
     /// So many folds are impossible.
     #[error("{folds} folds of {rows} measurements: expected 2 to {rows} folds")]
     Folds {

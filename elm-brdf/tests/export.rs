@@ -271,7 +271,7 @@ fn reach(model: &BrdfModel, channel: usize, value: f64, t_error: f64) -> f64 {
 fn check(name: &str, model: &dyn Brdf, pairs: &[Pair], found: &[[f64; 3]]) -> f64 {
     assert_eq!(found.len(), pairs.len(), "{name}");
     let expected = expected(model, pairs);
-    let bounds = bounds(model.as_network().unwrap(), pairs);
+    let bounds = bounds(BrdfModel::of(&*model).unwrap(), pairs);
     let mut worst: f64 = 0.0;
     let mut compared = 0;
     for (row, pair) in pairs.iter().enumerate() {
@@ -304,7 +304,7 @@ fn sources(language: Language) -> Vec<(String, Box<dyn Brdf>, String)> {
     models()
         .into_iter()
         .map(|(name, model)| {
-            let text = source(model.as_network().unwrap(), language, &name).unwrap();
+            let text = source(BrdfModel::of(&*model).unwrap(), language, &name).unwrap();
             (name, model, text)
         })
         .collect()
@@ -608,17 +608,17 @@ fn what_cannot_be_exported_is_an_error_of_its_own() {
         9,
         Activation::custom("softsign", |z: f64| z / (1.0 + z.abs())),
     ));
-    let error = source(custom.as_network().unwrap(), Language::C, "m").unwrap_err();
+    let error = source(BrdfModel::of(&*custom).unwrap(), Language::C, "m").unwrap_err();
     assert_eq!(error.to_string(), "cannot export the activation 'softsign'");
     let huge = model(network(9, Activation::Sine).scale(1e300).standardise(false));
-    let error = source(huge.as_network().unwrap(), Language::C, "m").unwrap_err();
+    let error = source(BrdfModel::of(&*huge).unwrap(), Language::C, "m").unwrap_err();
     assert!(
         matches!(error, elm_brdf::Error::Export(ExportError::Single { .. })),
         "{error}"
     );
     let good = model(network(9, Activation::Sine));
     for name in ["", "1a", "a b", "_a", "a__b", "a_", "gl_a", "ä"] {
-        let error = source(good.as_network().unwrap(), Language::C, name).unwrap_err();
+        let error = source(BrdfModel::of(&*good).unwrap(), Language::C, name).unwrap_err();
         assert!(
             matches!(error, elm_brdf::Error::Export(ExportError::Name { .. })),
             "{error}"

@@ -7,6 +7,7 @@ mod browser;
 
 use elm_brdf::gallery::{self, Exhibit, Only, sphere};
 use elm_brdf::geometry::pairs;
+use elm_brdf::model::BrdfModel;
 use elm_brdf::render::{Bitmap, Options, default_network, render};
 use elm_datasets::{Invalid, MaterialId, synthetic};
 
@@ -26,7 +27,7 @@ fn exhibits() -> Vec<Exhibit> {
             Exhibit {
                 name: format!("</script> {id} & \"quoted\""),
                 origin: "a test".to_owned(),
-                model: brdf.as_network().unwrap().clone(),
+                model: BrdfModel::of(&*brdf).unwrap().clone(),
                 held_out: Some(0.01),
             }
         })

@@ -9,7 +9,8 @@ use ::csv::{ErrorKind, Position, ReaderBuilder, StringRecord};
 use ndarray::{Array2, Axis};
 
 use crate::Error;
-use crate::error::{Column, shorten};
+use crate::error::Column;
+use crate::text::shorten;
 
 /// A table of finite numbers with named columns: at least one of each.
 ///

@@ -1,9 +1,17 @@
 //! What can go wrong between a file or a name and an array of numbers.
 
+pub(crate) mod merl;
+pub(crate) mod pbrt;
+pub(crate) mod rgl;
+pub(crate) mod scattered;
+
 use std::fmt;
 use std::path::PathBuf;
 
-use crate::{merl, pbrt, rgl, scattered};
+use crate::text::none_or_list;
+
+/// Bytes that a file may have, unless its format says how many there are.
+pub(crate) const LARGEST_FILE: u64 = 1 << 30;
 
 /// What a numbered line of a CUReT file describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,7 +51,7 @@ pub enum Error {
     #[error(
         "{}: expected at most {} bytes, found {found}",
         path.display(),
-        crate::file::MOST
+        LARGEST_FILE
     )]
     TooLarge {
         /// The file.
@@ -457,41 +465,9 @@ pub enum Layout {
     },
 }
 
-/// The names with commas between, or "none". Escaped, for a column's name may hold a line end.
-fn none_or_list<S: AsRef<str>>(names: &[S]) -> String {
-    if names.is_empty() {
-        return "none".to_owned();
-    }
-    let names: Vec<String> = names
-        .iter()
-        .map(|name| name.as_ref().escape_debug().to_string())
-        .collect();
-    names.join(", ")
-}
-
 fn column_text(column: &Column) -> String {
     match column {
         Column::Index(index) => format!("number {index}"),
         Column::Name(name) => format!("column {name:?}"),
-    }
-}
-
-/// A piece of a file for an error: no more than a line can hold.
-pub(crate) fn shorten(text: &str) -> String {
-    const LONGEST: usize = 32;
-    if text.chars().count() <= LONGEST {
-        return text.to_owned();
-    }
-    text.chars().take(LONGEST).chain("...".chars()).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn long_texts_are_shortened_at_a_character_not_inside_one() {
-        assert_eq!(shorten("0.1"), "0.1");
-        assert_eq!(shorten(&"é".repeat(40)), format!("{}...", "é".repeat(32)));
     }
 }

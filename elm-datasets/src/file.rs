@@ -4,11 +4,7 @@ use std::fs;
 use std::io::{Read as _, Write as _};
 use std::path::Path;
 
-use crate::Error;
-
-/// Most bytes of a file that is read at once: several times the largest that there are, spectra of
-/// anisotropic materials of RGL's database.
-pub(crate) const MOST: u64 = 1 << 30;
+use crate::error::{Error, LARGEST_FILE};
 
 /// The whole file, unless it is larger than any of these formats gets.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, Error> {
@@ -18,13 +14,15 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>, Error> {
     };
     let file = fs::File::open(path).map_err(failed)?;
     let found = file.metadata().map_err(failed)?.len();
-    if found > MOST {
+    if found > LARGEST_FILE {
         let path = path.to_owned();
         return Err(Error::TooLarge { path, found });
     }
     let mut bytes = Vec::new();
     // A pipe has no length to look at.
-    file.take(MOST).read_to_end(&mut bytes).map_err(failed)?;
+    file.take(LARGEST_FILE)
+        .read_to_end(&mut bytes)
+        .map_err(failed)?;
     Ok(bytes)
 }
 

@@ -6,8 +6,8 @@ use std::str::FromStr;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-use crate::curet::MaterialId;
-use crate::error::shorten;
+use crate::material_id::MaterialId;
+use crate::text::shorten;
 use crate::{Directions, Error, Samples};
 
 /// What to do with negative reflectance, which noise gives and physics does not.

@@ -29,6 +29,8 @@ use std::path::Path;
 
 use ndarray::Array2;
 
+pub use crate::error::merl::Problem;
+use crate::error::merl::{DIMENSIONS, HEADER, LENGTH};
 use crate::vector::{Vector, cartesian, directions, half, mirror, pair};
 use crate::{Directions, Error, Samples, Sampling, file};
 
@@ -44,29 +46,8 @@ const CELLS: usize = THETA_H * THETA_D * PHI_D;
 /// BRDF per unit of the file: red, green, blue.
 const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
-const DIMENSIONS: [i32; 3] = [90, 90, 180];
-const HEADER: u64 = 12;
-const LENGTH: u64 = HEADER + 3 * 8 * CELLS as u64;
 /// What the table holds where there is no measurement.
 const NOTHING: f64 = -1.0;
-
-/// What is wrong with a file that is no table.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Problem {
-    /// The file is too short or too long.
-    #[error("expected {LENGTH} bytes, found {found}")]
-    Length {
-        /// Bytes in the file.
-        found: u64,
-    },
-    /// A table of another size.
-    #[error("at byte 0, expected the dimensions {DIMENSIONS:?}, found {found:?}")]
-    Dimensions {
-        /// The three numbers that stand there.
-        found: [i32; 3],
-    },
-}
 
 /// A MERL table. It holds 35 MB.
 ///

@@ -8,9 +8,9 @@ use std::str::FromStr;
 
 use ndarray::Axis;
 
-use crate::error::shorten;
 use crate::merl::Merl;
 use crate::rgl::Rgl;
+use crate::text::shorten;
 use crate::{Error, Invalid, Samples, Sampling, channel, fill_values, merl, pbrt, rgl, scattered};
 
 /// A file format.

@@ -29,7 +29,6 @@ mod angles;
 mod columns;
 mod long;
 mod note;
-mod problem;
 
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -37,27 +36,14 @@ use std::path::Path;
 use ndarray::{Array2, Axis};
 
 use crate::csv::{Cells, Table, line_of};
-use crate::error::shorten;
+use crate::error::scattered::{ANGLES, VECTORS};
+pub use crate::error::scattered::{AngleUnit, List, Problem};
+use crate::text::shorten;
 use crate::{Directions, Error, Samples, channel, file};
 pub(crate) use angles::HORIZON_TOLERANCE;
 use angles::{Found, Reader};
-pub use columns::List;
 use columns::Plan;
 pub use note::Note;
-pub use problem::Problem;
-
-const ANGLES: [&str; 4] = ["theta_i", "phi_i", "theta_o", "phi_o"];
-const VECTORS: [&str; 6] = ["wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z"];
-
-/// The unit of the angles in a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum AngleUnit {
-    /// A right angle is pi/2.
-    #[default]
-    Radians,
-    /// A right angle is 90.
-    Degrees,
-}
 
 /// What the file itself does not say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

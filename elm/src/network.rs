@@ -9,7 +9,6 @@ use crate::error::{Error, Result};
 use crate::feature_map::{FeatureMap, HiddenLayer, Scaler};
 use crate::memory::check_room;
 use crate::metrics::root_mean_squares;
-use crate::predictor::Predictor;
 use crate::scalar::Scalar;
 use crate::solve::norms::norm;
 use crate::solve::{Diagnosis, Reason, Solution};
@@ -196,24 +195,6 @@ impl<A: Scalar> Elm<A> {
     pub(crate) fn set_errors(&mut self, residuals: ArrayView2<'_, A>, left_out: ArrayView2<'_, A>) {
         self.diagnosis.residual_norm = residuals.columns().into_iter().map(norm).collect();
         self.diagnosis.leave_one_out = Some(root_mean_squares(left_out).to_vec());
-    }
-
-    /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs). Outside the
-    /// training rows predictions are held to their [`bounds`](Self::bounds).
-    ///
-    /// # Errors
-    /// [`Error::Shape`] when the number of inputs differs from the training data's,
-    /// [`Error::NotFinite`] for a NaN or infinity in `x`, [`Error::Overflow`] when a prediction is
-    /// outside the range of the type. No rows is fine and gives no rows.
-    pub fn predict(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
-        self.predictor().predict(x)
-    }
-
-    /// The network packed for evaluation: for many calls, few rows at a time, threads, or
-    /// memory of the caller's own.
-    #[must_use]
-    pub fn predictor(&self) -> Predictor<A> {
-        Predictor::new(self)
     }
 
     /// The hidden-layer matrix of these inputs (the paper's $F$, equation 9): shape (rows, inputs)

@@ -55,6 +55,26 @@ pub struct Predictor<A: Scalar> {
     output_bounds: Vec<(A, A)>,
 }
 
+impl<A: Scalar> Elm<A> {
+    /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs). Outside the
+    /// training rows predictions are held to their [`bounds`](Self::bounds).
+    ///
+    /// # Errors
+    /// [`Error::Shape`] when the number of inputs differs from the training data's,
+    /// [`Error::NotFinite`] for a NaN or infinity in `x`, [`Error::Overflow`] when a prediction is
+    /// outside the range of the type. No rows is fine and gives no rows.
+    pub fn predict(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
+        self.predictor().predict(x)
+    }
+
+    /// The network packed for evaluation: for many calls, few rows at a time, threads, or
+    /// memory of the caller's own.
+    #[must_use]
+    pub fn predictor(&self) -> Predictor<A> {
+        Predictor::new(self)
+    }
+}
+
 /// Working memory of a [`Predictor`], some tens of kilobytes; made by [`Predictor::scratch`].
 ///
 /// Each thread that predicts needs one of its own.

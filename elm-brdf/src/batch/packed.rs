@@ -6,7 +6,7 @@ use pulp::Simd;
 
 use super::dense::{Dense, Fused, MOST_INPUTS, Rectified, SquaredRectified};
 use super::real::Real;
-use super::{Batched, Block, Columns, Kernel, Precision, ROWS, eval_pairs, inputs, run};
+use super::{Batched, Block, Columns, Kernel, ROWS, eval_pairs, inputs, run};
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};
 use crate::features::Features;
@@ -308,10 +308,6 @@ macro_rules! brdf {
 
             fn stored_floats(&self) -> usize {
                 self.floats
-            }
-
-            fn by_columns(&self) -> Option<Precision<'_>> {
-                Some(Precision::$precision(self))
             }
         }
     };

@@ -11,6 +11,7 @@ use crate::error::Error;
 use crate::export::{ExportError, Format, Language, header, merl_table, source};
 use crate::file;
 use crate::geometry::pairs;
+use crate::model::BrdfModel;
 use crate::render::{Supply, default_network, scene};
 
 /// Write a model as source code or as a table, for other programs.
@@ -74,9 +75,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
             }
         }
         Format::Source(language) => {
-            let network = brdf
-                .as_network()
-                .ok_or(Error::Export(ExportError::NoNetwork))?;
+            let network = BrdfModel::of(&*brdf).ok_or(Error::Export(ExportError::NoNetwork))?;
             let mut text = source(network, language, &arguments.name)?;
             if arguments.output.extension().is_some_and(|e| e == "h") && language == Language::C {
                 text = header(&text, &arguments.name);

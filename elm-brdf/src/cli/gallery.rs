@@ -12,6 +12,7 @@ use crate::error::Error;
 use crate::export::ExportError;
 use crate::gallery::{self, Exhibit};
 use crate::geometry::pairs;
+use crate::model::BrdfModel;
 use crate::protocol::{Folds, cross_validate};
 use crate::render::default_network;
 
@@ -57,9 +58,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
             continue;
         };
         let brdf = network.fit(&pairs(&samples.directions), samples.values.view())?;
-        let model = brdf
-            .as_network()
-            .ok_or(Error::Export(ExportError::NoNetwork))?;
+        let model = BrdfModel::of(&*brdf).ok_or(Error::Export(ExportError::NoNetwork))?;
         let squares = score.channels.iter().map(|c| c.held_out.rmse.powi(2));
         exhibits.push(Exhibit {
             name: format!("{} {}", material.id, material.name),

@@ -2,7 +2,7 @@
 //! language: lines of `name = expression`, and the result. `z` and all names are vectors of four
 //! in shaders and numbers in C.
 
-use super::ExportError;
+use super::error::ExportError;
 
 /// A function of one argument `z`.
 pub(super) struct Function {

@@ -1,6 +1,6 @@
 //! The networks' inputs in the common notation: numbers made of the components of both directions.
 
-use super::ExportError;
+use super::error::ExportError;
 
 /// The expression of an input, by its name in [`Features`](crate::features::Features), made of the
 /// [`LOCALS`].

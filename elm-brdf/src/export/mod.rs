@@ -24,7 +24,7 @@
 //!     network: ElmParams::new(40).activation(Activation::Sine).solver(Ridge::leave_one_out()),
 //! };
 //! let model = params.fit(&pairs(&samples.directions), samples.values.view())?;
-//! let network = model.as_network().ok_or("a formula")?;
+//! let network = BrdfModel::of(&*model).ok_or("a formula")?;
 //! let shader = source(network, Language::Glsl, "felt")?;
 //! assert!(shader.contains("vec3 felt_eval(vec3 light, vec3 viewer)"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -32,19 +32,20 @@
 
 mod activations;
 mod dialect;
+pub(crate) mod error;
 mod inputs;
 mod network;
 mod precision;
 mod write;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::str::FromStr;
 
 use elm_datasets::Directions;
 use elm_datasets::merl::Merl;
-use thiserror::Error;
 
 pub use dialect::Language;
+pub use error::ExportError;
 pub use precision::{SinglePrecision, check_precision};
 pub use write::{header, source};
 
@@ -115,65 +116,6 @@ impl FromStr for Format {
     }
 }
 
-/// Why a model cannot be exported.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum ExportError {
-    /// A neuron's function that has no source, such as one of the user's own.
-    #[error("cannot export the activation '{name}'")]
-    Activation {
-        /// What it is called.
-        name: String,
-    },
-    /// A network input that has no source.
-    #[error("cannot export the input '{name}'")]
-    Input {
-        /// What it is called.
-        name: String,
-    },
-    /// A number beyond single precision.
-    #[error("cannot export {what}: {value} is beyond single precision")]
-    Single {
-        /// Which.
-        what: &'static str,
-        /// The number.
-        value: f64,
-    },
-    /// A name that no language takes for its functions.
-    #[error("'{name}' cannot begin the name of a function (expected letters, digits and _)")]
-    Name {
-        /// The name that was given.
-        name: String,
-    },
-    /// The file's extension says nothing of how to write it.
-    #[error(
-        "cannot tell the format of {} (expected .glsl, .wgsl, .hlsl, .c or .binary, or a format)",
-        path.display()
-    )]
-    Format {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A model that single precision would spoil.
-    #[error(
-        "single precision would move its values by {found:.2e} 1/sr, more than {}: fit it anew, with \
-         fewer neurons (fit --neurons N), or export a table, which is made in double precision \
-         (--format merl)",
-        precision::allowed(*limit, *held_out)
-    )]
-    Precision {
-        /// Root mean square of what it would move values by, in 1/sr.
-        found: f64,
-        /// The most that it may, in 1/sr.
-        limit: f64,
-        /// The model's own held-out RMSE, in 1/sr, where it is known.
-        held_out: Option<f64>,
-    },
-    /// A model that is no network.
-    #[error("only a network can be exported as source")]
-    NoNetwork,
-}
-
 /// The model in the format of the MERL database; one channel stands for all three. Negative
 /// values become 0, and what lies below the horizon has no value.
 ///
@@ -197,7 +139,9 @@ pub fn merl(brdf: &dyn Brdf) -> Result<Merl> {
 pub fn merl_table(brdf: &dyn Brdf) -> Result<(Merl, f64)> {
     /// Pairs at a time.
     const BLOCK: usize = 1 << 15;
-    let reordered = brdf.as_network().map(BrdfModel::in_rgb_order).transpose()?;
+    let reordered = BrdfModel::of(brdf)
+        .map(BrdfModel::in_rgb_order)
+        .transpose()?;
     let brdf = match &reordered {
         Some(network) => network as &dyn Brdf,
         None => brdf,
@@ -213,9 +157,7 @@ pub fn merl_table(brdf: &dyn Brdf) -> Result<(Merl, f64)> {
         asked.push(*directions);
         [0.0; 3]
     });
-    let known = brdf
-        .as_network()
-        .is_some_and(|m| m.features().is_reciprocal());
+    let known = BrdfModel::of(brdf).is_some_and(|m| m.features().is_reciprocal());
     let mut answers = Vec::with_capacity(asked.len());
     let (mut differences, mut squares) = (0.0, 0.0);
     for block in asked.chunks(BLOCK) {

@@ -1,7 +1,7 @@
 //! A network as exports need it: standardisation folded into the weights, neurons in order of their
 //! functions, single precision.
 
-use super::ExportError;
+use super::error::ExportError;
 use crate::link::Channel;
 use crate::model::BrdfModel;
 

@@ -4,7 +4,7 @@ use elm::Activation;
 use elm_datasets::Directions;
 use ndarray::{Array2, Zip};
 
-use super::ExportError;
+use super::error::ExportError;
 use super::network::{Network, Neuron};
 use crate::batch;
 use crate::brdf::Brdf;
@@ -146,14 +146,6 @@ pub fn check_precision(model: &BrdfModel) -> Result<SinglePrecision> {
         limit,
         held_out,
     }))
-}
-
-/// What may be moved, in words.
-pub(super) fn allowed(limit: f64, held_out: Option<f64>) -> String {
-    match held_out {
-        Some(error) => format!("{limit:.2e}, a quarter of its own held-out error {error:.2e}"),
-        None => format!("{limit:.2e}, a hundredth of the values themselves"),
-    }
 }
 
 /// Half the distance of numbers next to 1: the relative error of a rounding.

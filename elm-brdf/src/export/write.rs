@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use super::ExportError;
 use super::activations;
 use super::dialect::Language;
+use super::error::ExportError;
 use super::inputs;
 use super::network::{Network, Neuron, Output};
 use super::precision;

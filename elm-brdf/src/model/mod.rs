@@ -15,6 +15,7 @@ mod layer;
 mod scaled_once;
 mod tuned;
 
+use std::any::Any;
 use std::path::Path;
 
 use elm::solve::PseudoInverse;
@@ -105,6 +106,14 @@ impl BrdfModel {
             network,
             provenance: Provenance::default(),
         }
+    }
+
+    /// The model behind `brdf`, where it is one of these, for what only a network can do, such as
+    /// [being exported](crate::export).
+    #[must_use]
+    pub fn of(brdf: &dyn Brdf) -> Option<&Self> {
+        let any: &dyn Any = brdf;
+        any.downcast_ref()
     }
 
     /// The inputs of the network.
@@ -236,10 +245,6 @@ impl Brdf for BrdfModel {
 
     fn stored_floats(&self) -> usize {
         BrdfModel::stored_floats(self)
-    }
-
-    fn as_network(&self) -> Option<&BrdfModel> {
-        Some(self)
     }
 
     fn floats_per_channel(&self) -> usize {

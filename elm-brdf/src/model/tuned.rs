@@ -2,11 +2,13 @@
 
 mod anchors;
 mod censored;
+mod errors;
 mod few;
 mod finish;
 mod lean;
 mod many;
 mod moments;
+mod problem;
 mod rows;
 mod survey;
 
@@ -20,8 +22,9 @@ use crate::features::Features;
 use crate::geometry::Pair;
 use crate::metrics::Metric;
 use crate::quality;
-use finish::{Finished, Problem};
+use finish::Finished;
 pub use lean::Lean;
+use problem::Problem;
 
 /// Fits a network and chooses what is left open: inputs, the scale of each input, regularisation,
 /// and, of many neurons drawn, which to keep.

@@ -1,12 +1,14 @@
 //! Time per evaluation, the models taking turns.
 
+use std::any::Any;
 use std::hint::black_box;
 use std::time::Instant;
 
-use crate::batch::{Batched, Columns, Precision, Real};
+use crate::batch::{Batched, Columns, Packed, Precision, Real};
 use crate::brdf::Brdf;
 use crate::error::Result;
 use crate::geometry::Pair;
+use crate::reference::Nbrdf;
 
 /// Pairs in a batch: its directions and values stay in the second-level cache.
 const BATCH: usize = 4096;
@@ -49,13 +51,26 @@ pub(super) fn take_turns(models: &[Box<dyn Brdf>], pairs: &[Pair]) -> Result<Vec
     Ok(all.into_iter().map(|(_, _, times)| median(times)).collect())
 }
 
+/// The model for directions in columns, where it is packed for them.
+fn by_columns(model: &dyn Brdf) -> Option<Precision<'_>> {
+    let any: &dyn Any = model;
+    if let Some(packed) = any.downcast_ref::<Packed<f32>>() {
+        Some(Precision::Single(packed))
+    } else if let Some(packed) = any.downcast_ref::<Packed<f64>>() {
+        Some(Precision::Double(packed))
+    } else {
+        let other = any.downcast_ref::<Nbrdf>()?;
+        Some(Precision::Single(other))
+    }
+}
+
 impl<'a> Timed<'a> {
     fn new(model: &'a dyn Brdf, batch: &[Pair]) -> Self {
         fn room<A: Real>(model: &dyn Batched<A>, batch: &[Pair]) -> (Columns<A>, Vec<A>) {
             let values = vec![A::zero(); batch.len() * model.channels()];
             (Columns::new(batch), values)
         }
-        match model.by_columns() {
+        match by_columns(model) {
             Some(Precision::Single(model)) => {
                 let (columns, values) = room(model, batch);
                 Self::Single(model, columns, values)

@@ -23,6 +23,7 @@ use crate::brdf::Brdf;
 use crate::error::Result;
 use crate::geometry::Pair;
 use crate::metrics::{Metric, Metrics};
+use crate::model::BrdfModel;
 
 /// Measurements to fit to, and others of the same material that judge.
 #[derive(Debug, Clone)]
@@ -163,7 +164,7 @@ pub fn run(
 
 /// A network in single and in double precision, packed; any other model as it is.
 fn forms(name: &str, model: Box<dyn Brdf>) -> Result<Vec<(String, Box<dyn Brdf>)>> {
-    let Some(network) = model.as_network() else {
+    let Some(network) = BrdfModel::of(&*model) else {
         return Ok(vec![(name.to_owned(), model)]);
     };
     Ok(vec![

@@ -6,9 +6,7 @@ use std::path::Path;
 use ndarray::Array2;
 use pulp::Simd;
 
-use crate::batch::{
-    Batched, Block, Columns, Dense, Kernel, Precision, ROWS, Real, eval_pairs, run,
-};
+use crate::batch::{Batched, Block, Columns, Dense, Kernel, ROWS, Real, eval_pairs, run};
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};
 use crate::geometry::Pair;
@@ -221,9 +219,5 @@ impl Brdf for Nbrdf {
 
     fn stored_floats(&self) -> usize {
         Self::FLOATS
-    }
-
-    fn by_columns(&self) -> Option<Precision<'_>> {
-        Some(Precision::Single(self))
     }
 }

@@ -5,7 +5,6 @@ use std::path::Path;
 
 use super::distribution::Distribution2;
 use super::error::SceneError;
-use super::light::LightSample;
 use super::vector::{Frame, Rgb, Vec3, largest, luminance, scaled, times};
 use crate::geometry::Vector;
 
@@ -31,6 +30,20 @@ pub(crate) struct Panorama {
     distribution: Distribution2,
     /// Turn about the vertical as a part of a full turn.
     turn: f64,
+}
+
+/// A direction to a light.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LightSample {
+    pub(crate) direction: Vec3,
+    /// How far the way must be free.
+    pub(crate) distance: f64,
+    /// What arrives: radiance over density, or irradiance across the direction for a light
+    /// without extent.
+    pub(crate) arriving: Rgb,
+    /// Density in solid angle; `None` for a light without extent, which no other way of sampling
+    /// can find.
+    pub(crate) density: Option<f64>,
 }
 
 impl Environment {

@@ -122,7 +122,7 @@ pub enum SceneError {
         /// Its name.
         name: String,
         /// Why not.
-        reason: Box<crate::Error>,
+        reason: Box<dyn std::error::Error + Send + Sync>,
     },
     /// A worker thread pool could not be started.
     #[error("cannot start {threads} threads: {reason}")]

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::environment::Environment;
+use super::environment::{Environment, LightSample};
 use super::shape::Form;
 use super::vector::{BLACK, Rgb, Vec3, scaled};
 
@@ -21,20 +21,6 @@ pub(crate) struct Area {
     pub(crate) corner: Vec3,
     pub(crate) edges: [Vec3; 2],
     pub(crate) radiance: Rgb,
-}
-
-/// A direction to a light.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct LightSample {
-    pub(crate) direction: Vec3,
-    /// How far the way must be free.
-    pub(crate) distance: f64,
-    /// What arrives: radiance over density, or irradiance across the direction for a light
-    /// without extent.
-    pub(crate) arriving: Rgb,
-    /// Density in solid angle; `None` for a light without extent, which no other way of sampling
-    /// can find.
-    pub(crate) density: Option<f64>,
 }
 
 impl Light {

@@ -22,7 +22,7 @@ mod camera;
 mod distribution;
 mod economy;
 mod environment;
-mod error;
+pub(crate) mod error;
 mod film;
 mod light;
 mod material;

@@ -3,7 +3,8 @@
 
 use super::account::{Reason, Savings, Tally};
 use super::batch::{Batch, CAPACITY, Request, SCATTERED};
-use super::light::{Light, LightSample, power_heuristic};
+use super::environment::LightSample;
+use super::light::{Light, power_heuristic};
 use super::random::{Purpose, numbers, pixel_seed};
 use super::shape::{Ray, SurfacePoint};
 use super::shelf::Shelf;

@@ -13,7 +13,6 @@
 //! [`read`] takes the three channels if all are there, and the mean otherwise; [`write()`] makes
 //! such a folder; [`rig`] gives the directions from the geometry of the apparatus.
 
-mod names;
 mod parse;
 pub mod rig;
 mod write;
@@ -22,7 +21,7 @@ use std::path::Path;
 
 use ndarray::{Array2, ArrayViewMut1};
 
-pub use names::{MATERIALS, MaterialId, NAMES};
+pub use crate::material_id::{MATERIALS, MaterialId, NAMES};
 pub use write::write;
 
 use crate::file;

@@ -6,7 +6,8 @@ use std::path::Path;
 use ndarray::ArrayViewMut1;
 
 use super::{MATERIALS, MEASUREMENTS, MaterialId};
-use crate::error::{Column, Entry, shorten};
+use crate::error::{Column, Entry};
+use crate::text::shorten;
 use crate::{Directions, Error};
 
 /// The four angles in the order of `table.txt`: the viewer comes first.

@@ -9,8 +9,8 @@
 //! | 2, 1, 8 | number of dimensions, type, byte at which the numbers begin |
 //! | 8 each | sizes of the dimensions, the last running fastest |
 
-use super::Problem;
-use crate::error::shorten;
+use crate::error::rgl::Problem;
+use crate::text::shorten;
 
 pub(super) const MAGIC: &[u8; 12] = b"tensor_file\0";
 const VERSION: [u8; 2] = [1, 0];

@@ -3,8 +3,9 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::{ANGLES, AngleUnit, Note, Problem};
+use super::Note;
 use crate::Directions;
+use crate::error::scattered::{ANGLES, AngleUnit, Problem};
 use crate::vector::{Vector, directions, dot};
 
 /// How far from 1 the length of a direction may be: numbers with three decimals are each up to

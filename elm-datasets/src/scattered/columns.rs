@@ -1,10 +1,9 @@
 //! Which columns of a table are directions, which are reflectance, and which are neither.
 
-use std::fmt;
-
-use super::{ANGLES, Columns, Problem, VECTORS, is_direction};
+use super::{Columns, is_direction};
 use crate::channel::{self, Kind};
-use crate::error::shorten;
+use crate::error::scattered::{ANGLES, List, Problem, VECTORS};
+use crate::text::shorten;
 
 /// Where the directions stand.
 #[derive(Debug, Clone, Copy)]
@@ -168,33 +167,4 @@ fn undisputed(names: &[String], rest: &[usize]) -> Result<Vec<usize>, Problem> {
     Err(Problem::NotReflectance {
         columns: List::of(doubtful),
     })
-}
-
-/// Names of columns in an error: not more, and not longer ones, than a line can hold.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct List(Vec<String>);
-
-impl List {
-    pub(super) fn of<'a>(names: impl IntoIterator<Item = &'a String>) -> Self {
-        const MOST: usize = 8;
-        let mut names: Vec<String> = names.into_iter().map(|name| shorten(name)).collect();
-        if names.len() > MOST {
-            names.truncate(MOST);
-            names.push("...".to_owned());
-        }
-        Self(names)
-    }
-}
-
-impl fmt::Display for List {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (index, name) in self.0.iter().enumerate() {
-            let comma = if index > 0 { ", " } else { "" };
-            write!(f, "{comma}{}", name.escape_debug())?;
-        }
-        if self.0.is_empty() {
-            f.write_str("none")?;
-        }
-        Ok(())
-    }
 }

@@ -7,7 +7,7 @@ use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut2, Axis, s};
 use serde::{Deserialize, Serialize};
 
 use super::distance;
-use super::params::Kind;
+use super::neurons::Kind;
 use crate::activation::Activation;
 use crate::check::{check_length, check_matrix};
 use crate::error::{Error, Result};

@@ -7,6 +7,7 @@ mod distance;
 mod gradient;
 mod kernels;
 mod layer;
+mod neurons;
 mod packed;
 mod packed_map;
 mod params;
@@ -26,9 +27,10 @@ use crate::scalar::Scalar;
 
 pub(crate) use kernels::{Accumulate, sum_of_line};
 pub use layer::{Group, HiddenLayer};
+pub use neurons::{Biases, Distribution, Kind, Neurons};
 pub(crate) use packed::CHUNK_PANELS;
 pub(crate) use packed_map::{PackedMap, TILE_ROWS, TileBuffers, tile_rows};
-pub use params::{Biases, Distribution, FeatureMapParams, Kind, Neurons};
+pub use params::FeatureMapParams;
 pub(crate) use rows::FeatureRows;
 pub use scaler::{Scaler, ScalerBuilder};
 

@@ -1,13 +1,18 @@
 //! Drawing the random layer from a seed.
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, s};
+use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, s};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{StandardNormal, StandardUniform};
 
+use super::FeatureMap;
 use super::layer::{Group, HiddenLayer};
-use super::params::{Biases, Distribution, FeatureMapParams, Kind, Neurons};
+use super::neurons::{Biases, Distribution, Kind, Neurons};
+use super::params::FeatureMapParams;
 use super::scaler::Scaler;
+use crate::check::{check_length, check_matrix};
+use crate::error::{Error, Result};
+use crate::memory::check_room;
 use crate::scalar::Scalar;
 use crate::stats::Sum;
 
@@ -57,6 +62,62 @@ impl<'a, A: Scalar> From<ArrayView2<'a, A>> for Inputs<'a, A> {
 }
 
 impl<A: Scalar> FeatureMapParams<A> {
+    /// The random layer alone, for this many inputs.
+    ///
+    /// # Errors
+    /// Those of [`check`](Self::check); [`Error::Empty`] without inputs, [`Error::Shape`] for another
+    /// number of input scales, [`Error::TooLarge`]; [`Error::Conflict`] for neurons that are laid on
+    /// training rows ([`Biases::OnData`], [`Kind::Radial`]), as there are none.
+    pub fn draw(&self, inputs: usize) -> Result<HiddenLayer<A>> {
+        self.check()?;
+        if self.needs_rows() {
+            return Err(Error::Conflict {
+                first: "neurons laid on training rows",
+                second: "a layer without them",
+            });
+        }
+        let nowhere = Array2::zeros((1, inputs));
+        check_matrix("inputs", nowhere.view())?;
+        self.draw_layer(nowhere.view(), None, None)
+    }
+
+    /// The map for these training rows, shape (rows, inputs): measures them and draws the layer.
+    ///
+    /// # Errors
+    /// Those of [`draw`](Self::draw) but the last; [`Error::Empty`] and [`Error::NotFinite`] for `x`.
+    pub fn draw_on(&self, x: &ArrayRef2<A>) -> Result<FeatureMap<A>> {
+        self.check()?;
+        check_matrix("inputs", x.view())?;
+        self.draw_weighted(x.view(), None)
+    }
+
+    /// As [`draw_on`](Self::draw_on), for rows of these positive weights; all has been checked.
+    pub(crate) fn draw_weighted(
+        &self,
+        x: ArrayView2<'_, A>,
+        weights: Option<ArrayView1<'_, A>>,
+    ) -> Result<FeatureMap<A>> {
+        let scaler = self.standardise.then(|| Scaler::measure(x, weights));
+        let layer = self.draw_layer(x, scaler.as_ref(), weights)?;
+        Ok(FeatureMap::of_checked(scaler, layer, self.direct_links))
+    }
+
+    /// The layer for these rows, standardised by `scaler`, of these positive weights.
+    pub(crate) fn draw_layer(
+        &self,
+        x: ArrayView2<'_, A>,
+        scaler: Option<&Scaler<A>>,
+        weights: Option<ArrayView1<'_, A>>,
+    ) -> Result<HiddenLayer<A>> {
+        // A failed allocation would abort the program.
+        let per_neuron = x.ncols().saturating_add(1);
+        check_room("the hidden layer", per_neuron, self.neurons())?;
+        if !self.input_scales.is_empty() {
+            check_length("input scales", self.input_scales.len(), x.ncols())?;
+        }
+        Ok(self.sample(Inputs::new(x, scaler), weights))
+    }
+
     /// The layer for these (standardised) training rows with these positive weights.
     pub(super) fn sample<'a>(
         &self,

@@ -197,6 +197,17 @@ fn unit_weights<A: Scalar>(rows: usize, weights: Option<&ArrayView1<'_, A>>) -> 
     (largest, weights.mapv(|w| w / largest))
 }
 
+/// For each column the largest $\sqrt{w_i} |a_{ij}|$, in `f64`.
+pub(super) fn magnitudes<A: Scalar>(matrix: ArrayView2<'_, A>, roots: &Array1<f64>) -> Array1<f64> {
+    let mut largest = Array1::zeros(matrix.ncols());
+    for (row, root) in matrix.rows().into_iter().zip(roots) {
+        for (largest, value) in largest.iter_mut().zip(row) {
+            *largest = f64::max(*largest, root * value.as_f64().abs());
+        }
+    }
+    largest
+}
+
 /// For each column the largest $\sqrt{w_i} |a_{ij}|$.
 pub(crate) fn weighted_magnitudes<A: Scalar>(
     matrix: ArrayView2<'_, A>,

@@ -9,8 +9,7 @@ use std::ops::Range;
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, ShapeBuilder, s};
 
-use super::frame::{Frame, weighted_magnitudes};
-use super::tiles::magnitudes;
+use super::frame::{Frame, magnitudes, weighted_magnitudes};
 use crate::error::Result;
 use crate::feature_map::FeatureRows;
 use crate::scalar::{Scalar, power_of_two};

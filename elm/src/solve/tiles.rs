@@ -9,7 +9,7 @@ use std::ops::Range;
 use ndarray::{Array1, Array2, ArrayView2, Axis, ShapeBuilder, s};
 
 use super::Route;
-use super::frame::Frame;
+use super::frame::{Frame, magnitudes};
 use super::gram;
 use super::moments::{Moments, RowSource, centre_of, spread_runs};
 use super::spectrum::Spectrum;
@@ -450,17 +450,6 @@ impl Stack {
 /// Sum of squares of each column.
 fn squares(matrix: ArrayView2<'_, f64>) -> Array1<f64> {
     matrix.map_axis(Axis(0), |column| column.dot(&column))
-}
-
-/// For each column the largest $\sqrt{w_i} |a_{ij}|$, in `f64`.
-pub(super) fn magnitudes<A: Scalar>(matrix: ArrayView2<'_, A>, roots: &Array1<f64>) -> Array1<f64> {
-    let mut largest = Array1::zeros(matrix.ncols());
-    for (row, root) in matrix.rows().into_iter().zip(roots) {
-        for (largest, value) in largest.iter_mut().zip(row) {
-            *largest = f64::max(*largest, root * value.as_f64().abs());
-        }
-    }
-    largest
 }
 
 impl<A: Scalar> Triangular<A> {

@@ -3,14 +3,15 @@
 use std::f64::consts::PI;
 
 use elm::{Activation, Biases, Distribution, ElmParams, Scaler};
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Slice};
+use ndarray::{Array1, Array2, ArrayView2, Axis, Slice};
 use rand::SeedableRng;
 use rand::seq::index;
 use rand_chacha::ChaCha8Rng;
 
-use super::finish::{Finished, Problem};
-use super::many::row_weights;
+use super::errors::{dark_noise, row_weights};
+use super::finish::Finished;
 use super::moments::Moments;
+use super::problem::Problem;
 use super::{Drawn, NOISY, Tuned, better, model_of};
 use crate::error::{Error, Result};
 use crate::features::Features;
@@ -320,31 +321,4 @@ fn left_out(
         there.assign(&weights.apply(h.slice_axis(Axis(0), fold)));
     }
     Some(fitted)
-}
-
-/// The standard deviation that the errors at the darker half of the rows have, by their median
-/// distance from their median.
-pub(super) fn dark_noise(fitted: ArrayView1<'_, f64>, values: ArrayView1<'_, f64>) -> f64 {
-    let middle = |values: &mut Vec<f64>| {
-        let place = values.len() / 2;
-        *values.select_nth_unstable_by(place, f64::total_cmp).1
-    };
-    if fitted.is_empty() {
-        return 0.0;
-    }
-    let dark = middle(&mut fitted.to_vec());
-    let rows = fitted
-        .iter()
-        .zip(values)
-        .filter(|(fitted, _)| **fitted <= dark);
-    let mut errors: Vec<f64> = rows.map(|(fitted, value)| value - fitted).collect();
-    if errors.is_empty() {
-        return 0.0;
-    }
-    let centre = middle(&mut errors);
-    errors
-        .iter_mut()
-        .for_each(|error| *error = (*error - centre).abs());
-    // The median of a normal deviate's size is 0.6745 standard deviations.
-    middle(&mut errors) / 0.6745
 }

@@ -8,64 +8,27 @@
 //! neighbours, they count for more.
 
 use elm::{Elm, FeatureMap, HiddenLayer, Scaler};
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Slice};
-use rand::SeedableRng;
-use rand::seq::index;
-use rand_chacha::ChaCha8Rng;
+use ndarray::{Array1, Array2, Axis, Slice};
 
-use super::anchors::{Anchors, Neighbourhood};
+use super::Drawn;
 use super::censored::Censored;
-use super::many::row_weights;
+use super::errors::{cut_off_means, geometric_root, no_fit};
 use super::moments::{WEAKEST, Weights, rounding};
+use super::problem::Problem;
 use super::rows::{Pull, Rows, STRENGTHS, TILE};
 use super::survey::Survey;
-use super::{Drawn, Tuned};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::features::Features;
-use crate::geometry::Pair;
-use crate::link::FittedLink;
 use crate::metrics::{Metric, Metrics};
 use crate::model::Layer;
 
-/// Folds of the cross-validation.
-const FOLDS: usize = 5;
-/// Rows that are left out in turn, at most.
-const JUDGED: usize = 6_000;
-/// Measurements that guesses are made from, at most.
-const KNOWN: usize = 4_000;
 /// The squared error that rounding makes counts so many times: what is exported is to be better
 /// than what rounding alone leaves.
 const ROUNDING: f64 = 25.0;
-/// Of the errors the largest are cut off at this quantile, lest a few rows decide.
-const QUANTILE: f64 = 0.99;
 /// While the albedo is not physical they count ten times as much, so many times.
 const STEPS: usize = 4;
 /// Rounds of working residuals end where targets move by a two-thousandth of their size.
 const CONVERGED: f64 = 2.5e-7;
-
-/// Measurements to be fitted, for all sets of inputs.
-pub(super) struct Problem<'a> {
-    pub(super) tuned: &'a Tuned,
-    pub(super) pairs: &'a [Pair],
-    pub(super) values: ArrayView2<'a, f64>,
-    pub(super) link: FittedLink,
-    /// Standard deviation of the noise of each channel's dark values, in 1/sr.
-    noise: Vec<f64>,
-    /// Whether that is as large as values are.
-    noisy: bool,
-    targets: Array2<f64>,
-    weights: Option<Array1<f64>>,
-    /// The rows that are left out in turn, fold by fold.
-    folds: Vec<Vec<usize>>,
-    /// All rows of the folds, in their order.
-    judged: Vec<usize>,
-    judged_pairs: Vec<Pair>,
-    /// The measurements that guesses are made from, as places among the judged.
-    known: Vec<usize>,
-    neighbourhood: Neighbourhood,
-    anchors: Anchors,
-    survey: Survey,
-}
 
 /// What a layer came to.
 pub(super) struct Finished {
@@ -79,49 +42,7 @@ pub(super) struct Finished {
     pub(super) excess: f64,
 }
 
-impl<'a> Problem<'a> {
-    pub(super) fn new(
-        tuned: &'a Tuned,
-        pairs: &'a [Pair],
-        values: ArrayView2<'a, f64>,
-        link: FittedLink,
-        noise: Vec<f64>,
-        noisy: bool,
-    ) -> Result<Self> {
-        let mut random = ChaCha8Rng::seed_from_u64(tuned.seed);
-        random.set_stream(8);
-        let rows = pairs.len();
-        let judged = index::sample(&mut random, rows, rows.min(JUDGED)).into_vec();
-        let count = FOLDS.min(rows);
-        let folds: Vec<Vec<usize>> = (0..count)
-            .map(|fold| judged.iter().copied().skip(fold).step_by(count).collect())
-            .collect();
-        let judged: Vec<usize> = folds.concat();
-        let judged_pairs: Vec<Pair> = judged.iter().map(|&row| pairs[row]).collect();
-        let known: Vec<usize> = (0..judged.len())
-            .step_by(judged.len().div_ceil(KNOWN).max(1))
-            .collect();
-        let known_pairs: Vec<Pair> = known.iter().map(|&place| judged_pairs[place]).collect();
-        let neighbourhood = Neighbourhood::new(&known_pairs);
-        Ok(Self {
-            targets: link.to_targets(values)?,
-            weights: row_weights(tuned.metric, pairs, values, &link),
-            anchors: Anchors::new(&neighbourhood, tuned.seed),
-            survey: Survey::new(),
-            tuned,
-            pairs,
-            values,
-            link,
-            noise,
-            noisy,
-            folds,
-            judged,
-            judged_pairs,
-            known,
-            neighbourhood,
-        })
-    }
-
+impl Problem<'_> {
     /// Fits the output weights of the layers of `drawn` together; `x` has the inputs of all rows.
     pub(super) fn finish(
         &self,
@@ -138,13 +59,16 @@ impl<'a> Problem<'a> {
         let (strength, held_out) = self.strength(&rows, &reach, None, (2..STRENGTHS).step_by(2))?;
         let at_anchors = map.transform(&features.compute(&self.anchors.pairs))?;
         let mut pull = Pull::new(self, at_anchors, &self.variances(&held_out));
+        let survey = Survey::new();
         let mut best = None;
         for _ in 0..=STEPS {
             let near = rows.near(strength);
             let (strength, held_out) = self.strength(&rows, &reach, Some(&pull), near)?;
             let weights = self.solve(&rows, &map, x, strength, &pull)?;
             let network = Elm::from_parts(map.clone(), weights.beta, weights.intercept)?;
-            let excess = self.survey.excess(self, features, &network)?;
+            let excess = survey.excess(features, &network, &self.link, |pairs| {
+                self.neighbours_guess(pairs)
+            })?;
             let better = |&(_, _, known): &(_, _, f64)| excess < known;
             if best.as_ref().is_none_or(better) {
                 best = Some((network, held_out, excess));
@@ -166,17 +90,6 @@ impl<'a> Problem<'a> {
             held_out: self.metrics(&held_out)?,
             excess,
         })
-    }
-
-    /// The targets of some rows.
-    pub(super) fn targets(&self, rows: &[usize]) -> Array2<f64> {
-        self.targets.select(Axis(0), rows)
-    }
-
-    /// What the metric makes of errors at some rows, where it makes anything of them.
-    pub(super) fn weights(&self, rows: &[usize]) -> Option<Array1<f64>> {
-        let weights = self.weights.as_ref();
-        weights.map(|weights| weights.select(Axis(0), rows))
     }
 
     fn metrics(&self, held_out: &Array2<f64>) -> Result<Option<Metrics>> {
@@ -302,47 +215,6 @@ impl<'a> Problem<'a> {
         (best..tried.len()).rev().find(as_good).unwrap_or(best)
     }
 
-    /// The rows that are left out in turn, fold by fold.
-    pub(super) fn folds(&self) -> &[Vec<usize>] {
-        &self.folds
-    }
-
-    /// All rows of the folds, in their order.
-    pub(super) fn judged(&self) -> &[usize] {
-        &self.judged
-    }
-
-    /// The rows that guesses are made from.
-    fn known_rows(&self) -> Vec<usize> {
-        self.known.iter().map(|&place| self.judged[place]).collect()
-    }
-
-    /// What the nearest measurements say of the targets at any pairs.
-    pub(super) fn neighbours_guess(&self, pairs: &[Pair]) -> Array2<f64> {
-        let targets = self.targets(&self.known_rows());
-        self.neighbourhood.guess(pairs, targets.view())
-    }
-
-    /// What anchors count where the targets have these variances about a network.
-    pub(super) fn anchor_weights(&self, variances: &[f64]) -> Array1<f64> {
-        let targets = self.targets(&self.known_rows());
-        self.anchors.weights(targets.view(), variances)
-    }
-
-    /// What the targets suggest at each anchor, by the rows in a place among the judged of which
-    /// `is_there`.
-    pub(super) fn guesses_of_targets(&self, is_there: impl Fn(usize) -> bool) -> Array2<f64> {
-        self.guesses(&self.targets, is_there)
-    }
-
-    /// What `targets`, of all rows, suggest at each anchor, by the known rows that are in a place among
-    /// the judged of which `is_there`.
-    fn guesses(&self, targets: &Array2<f64>, is_there: impl Fn(usize) -> bool) -> Array2<f64> {
-        let targets = targets.select(Axis(0), &self.known_rows());
-        self.anchors
-            .targets(targets.view(), |known| is_there(self.known[known]))
-    }
-
     /// The output weights for all rows.
     ///
     /// The mean of a logarithm is not the logarithm of the mean: noise makes a network of mean targets
@@ -401,32 +273,8 @@ impl<'a> Problem<'a> {
     }
 }
 
-pub(super) fn no_fit() -> Error {
-    Error::Elm(elm::Error::NoConvergence {
-        what: "the search for a strength of regularisation",
-    })
-}
-
 /// The size of the sum that each neuron's function is applied to, of standardised inputs.
 fn reach(hidden: &HiddenLayer<f64>) -> Array1<f64> {
     let squares = hidden.weights().mapv(|w| w * w).sum_axis(Axis(0));
     (squares + hidden.biases().mapv(|b| b * b)).mapv(f64::sqrt)
-}
-
-/// The mean of each column of squared errors, the largest cut off.
-pub(super) fn cut_off_means(squares: ArrayView2<'_, f64>) -> Vec<f64> {
-    let mean = |column: ArrayView1<'_, f64>| {
-        let mut sorted = column.to_vec();
-        let place = (sorted.len() as f64 * QUANTILE).ceil() as usize;
-        let place = place.clamp(1, sorted.len()) - 1;
-        let most = *sorted.select_nth_unstable_by(place, f64::total_cmp).1;
-        column.iter().map(|&square| square.min(most)).sum::<f64>() / column.len() as f64
-    };
-    squares.columns().into_iter().map(mean).collect()
-}
-
-/// The geometric mean of the roots.
-pub(super) fn geometric_root(variances: &[f64]) -> f64 {
-    let logs = variances.iter().map(|variance| variance.max(1e-300).ln());
-    (0.5 * logs.sum::<f64>() / variances.len() as f64).exp()
 }

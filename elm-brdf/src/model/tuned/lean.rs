@@ -8,7 +8,8 @@ use rand::SeedableRng;
 use rand::seq::index;
 use rand_chacha::ChaCha8Rng;
 
-use super::many::{RIDGE, row_weights};
+use super::errors::row_weights;
+use super::many::RIDGE;
 use super::{Drawn, provenance};
 use crate::brdf::{Brdf, Fit, check};
 use crate::error::Result;

@@ -3,13 +3,14 @@
 use elm::Scaler;
 use elm::prune::Keep;
 use elm::solve::Ridge;
-use ndarray::{Array1, Array2, ArrayView2, Axis};
+use ndarray::{Array2, ArrayView2, Axis};
 use rand::SeedableRng;
 use rand::seq::index;
 use rand_chacha::ChaCha8Rng;
 
-use super::few::dark_noise;
-use super::finish::{Finished, Problem, cut_off_means, geometric_root};
+use super::errors::{cut_off_means, dark_noise, geometric_root};
+use super::finish::Finished;
+use super::problem::Problem;
 use super::{Drawn, NOISY, TIE, Tuned, better, model_of};
 use crate::error::{Error, Result};
 use crate::features::Features;
@@ -109,35 +110,6 @@ fn finished(problem: &Problem<'_>, setting: &Setting, rows: &[usize]) -> Result<
     )?;
     let layer = layer.pruned(&pruned.kept)?;
     problem.finish(setting.set, &scaler, &[layer], &x)
-}
-
-/// What an error of a row's target is in the metric: to first order
-/// $(f + o) \cos\theta_o / (1 + f \cos\theta_o)$ for the log-cosine error of a target $\ln(1 + f/o)$,
-/// mean over channels. As a weight of *squares* it stands between least squares and the least
-/// absolute errors that the metric asks for. `None` for metrics that targets serve as they are: the
-/// cube root, which is near to them, and RMSE, of which a few bright rows would leave nothing to the
-/// others.
-pub(super) fn row_weights(
-    metric: Metric,
-    pairs: &[Pair],
-    values: ArrayView2<'_, f64>,
-    link: &FittedLink,
-) -> Option<Array1<f64>> {
-    if metric != Metric::LogCosine {
-        return None;
-    }
-    let offsets = link.offsets();
-    let weights = pairs.iter().zip(values.rows()).map(|(pair, values)| {
-        // At grazing every error counts little, but a row of no weight would be no row.
-        let cosine = pair.outgoing[2].max(1e-3);
-        let sum: f64 = values
-            .iter()
-            .zip(&offsets)
-            .map(|(&f, o)| (f.max(0.0) + o) * cosine / (1.0 + f.max(0.0) * cosine))
-            .sum();
-        sum / values.len() as f64
-    });
-    Some(weights.collect())
 }
 
 /// Some of the rows.

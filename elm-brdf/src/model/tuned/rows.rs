@@ -3,8 +3,9 @@
 use elm::FeatureMap;
 use ndarray::{Array1, Array2, ArrayView2, Axis, Slice};
 
-use super::finish::{Problem, no_fit};
+use super::errors::no_fit;
 use super::moments::{Moments, WEAKEST};
+use super::problem::Problem;
 use crate::error::Result;
 
 /// Rows whose hidden-layer matrix is there at a time.

@@ -3,11 +3,11 @@
 use elm::Elm;
 use ndarray::Array2;
 
-use super::finish::Problem;
 use crate::albedo::{self, Node};
 use crate::error::Result;
 use crate::features::Features;
 use crate::geometry::Pair;
+use crate::link::FittedLink;
 
 /// Angles of the light in degrees at which the albedo must be physical besides the stated ones.
 const FURTHER_ANGLES: [f64; 3] = [80.0, 88.0, 89.5];
@@ -29,12 +29,13 @@ impl Survey {
     }
 
     /// By how much the albedo, for light or for viewer at one of the angles, is above 1 and above what
-    /// the nearest measurements give.
+    /// the nearest measurements give, whose targets `nearest` says.
     pub(super) fn excess(
         &self,
-        problem: &Problem<'_>,
         features: Features,
         network: &Elm<f64>,
+        link: &FittedLink,
+        nearest: impl Fn(&[Pair]) -> Array2<f64>,
     ) -> Result<f64> {
         let mut excess = 0.0_f64;
         let orders: &[bool] = if features.is_reciprocal() {
@@ -53,13 +54,13 @@ impl Survey {
                 };
                 let pairs: Vec<Pair> = nodes.iter().map(of).collect();
                 let sums = |targets: Array2<f64>| -> Result<Vec<f64>> {
-                    Ok(albedo::sums(nodes, problem.link.to_values(targets)?.view()))
+                    Ok(albedo::sums(nodes, link.to_values(targets)?.view()))
                 };
                 let found = sums(network.predict(&features.compute(&pairs))?)?;
                 if found.iter().all(|&albedo| albedo <= 1.0) {
                     continue;
                 }
-                let implied = sums(problem.neighbours_guess(&pairs))?;
+                let implied = sums(nearest(&pairs))?;
                 for (found, implied) in found.into_iter().zip(implied) {
                     excess = excess.max(found - implied.max(1.0));
                 }

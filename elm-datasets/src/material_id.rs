@@ -6,7 +6,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::error::shorten;
+use crate::text::shorten;
 
 /// How many materials there are.
 pub const MATERIALS: usize = 61;

@@ -1,6 +1,52 @@
 //! What can be wrong with a table.
 
-use super::{ANGLES, AngleUnit, List, VECTORS};
+use std::fmt;
+
+use crate::text::shorten;
+
+/// Columns of directions as angles.
+pub(crate) const ANGLES: [&str; 4] = ["theta_i", "phi_i", "theta_o", "phi_o"];
+/// Columns of directions as unit vectors.
+pub(crate) const VECTORS: [&str; 6] = ["wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z"];
+
+/// The unit of the angles in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum AngleUnit {
+    /// A right angle is pi/2.
+    #[default]
+    Radians,
+    /// A right angle is 90.
+    Degrees,
+}
+
+/// Names of columns in an error: not more, and not longer ones, than a line can hold.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct List(Vec<String>);
+
+impl List {
+    pub(crate) fn of<'a>(names: impl IntoIterator<Item = &'a String>) -> Self {
+        const MOST: usize = 8;
+        let mut names: Vec<String> = names.into_iter().map(|name| shorten(name)).collect();
+        if names.len() > MOST {
+            names.truncate(MOST);
+            names.push("...".to_owned());
+        }
+        Self(names)
+    }
+}
+
+impl fmt::Display for List {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, name) in self.0.iter().enumerate() {
+            let comma = if index > 0 { ", " } else { "" };
+            write!(f, "{comma}{}", name.escape_debug())?;
+        }
+        if self.0.is_empty() {
+            f.write_str("none")?;
+        }
+        Ok(())
+    }
+}
 
 /// What is wrong with a table of samples.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

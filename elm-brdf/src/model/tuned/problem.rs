@@ -1,0 +1,142 @@
+//! The measurements of a fit: targets, weights, folds, and what is guessed where nothing was measured.
+
+use ndarray::{Array1, Array2, ArrayView2, Axis};
+use rand::SeedableRng;
+use rand::seq::index;
+use rand_chacha::ChaCha8Rng;
+
+use super::Tuned;
+use super::anchors::{Anchors, Neighbourhood};
+use super::errors::row_weights;
+use crate::error::Result;
+use crate::geometry::Pair;
+use crate::link::FittedLink;
+
+/// Folds of the cross-validation.
+const FOLDS: usize = 5;
+/// Rows that are left out in turn, at most.
+const JUDGED: usize = 6_000;
+/// Measurements that guesses are made from, at most.
+const KNOWN: usize = 4_000;
+
+/// Measurements to be fitted, for all sets of inputs.
+pub(super) struct Problem<'a> {
+    pub(super) tuned: &'a Tuned,
+    pub(super) pairs: &'a [Pair],
+    pub(super) values: ArrayView2<'a, f64>,
+    pub(super) link: FittedLink,
+    /// Standard deviation of the noise of each channel's dark values, in 1/sr.
+    pub(super) noise: Vec<f64>,
+    /// Whether that is as large as values are.
+    pub(super) noisy: bool,
+    pub(super) targets: Array2<f64>,
+    pub(super) weights: Option<Array1<f64>>,
+    /// The rows that are left out in turn, fold by fold.
+    pub(super) folds: Vec<Vec<usize>>,
+    /// All rows of the folds, in their order.
+    pub(super) judged: Vec<usize>,
+    pub(super) judged_pairs: Vec<Pair>,
+    /// The measurements that guesses are made from, as places among the judged.
+    pub(super) known: Vec<usize>,
+    pub(super) neighbourhood: Neighbourhood,
+    pub(super) anchors: Anchors,
+}
+
+impl<'a> Problem<'a> {
+    pub(super) fn new(
+        tuned: &'a Tuned,
+        pairs: &'a [Pair],
+        values: ArrayView2<'a, f64>,
+        link: FittedLink,
+        noise: Vec<f64>,
+        noisy: bool,
+    ) -> Result<Self> {
+        let mut random = ChaCha8Rng::seed_from_u64(tuned.seed);
+        random.set_stream(8);
+        let rows = pairs.len();
+        let judged = index::sample(&mut random, rows, rows.min(JUDGED)).into_vec();
+        let count = FOLDS.min(rows);
+        let folds: Vec<Vec<usize>> = (0..count)
+            .map(|fold| judged.iter().copied().skip(fold).step_by(count).collect())
+            .collect();
+        let judged: Vec<usize> = folds.concat();
+        let judged_pairs: Vec<Pair> = judged.iter().map(|&row| pairs[row]).collect();
+        let known: Vec<usize> = (0..judged.len())
+            .step_by(judged.len().div_ceil(KNOWN).max(1))
+            .collect();
+        let known_pairs: Vec<Pair> = known.iter().map(|&place| judged_pairs[place]).collect();
+        let neighbourhood = Neighbourhood::new(&known_pairs);
+        Ok(Self {
+            targets: link.to_targets(values)?,
+            weights: row_weights(tuned.metric, pairs, values, &link),
+            anchors: Anchors::new(&neighbourhood, tuned.seed),
+            tuned,
+            pairs,
+            values,
+            link,
+            noise,
+            noisy,
+            folds,
+            judged,
+            judged_pairs,
+            known,
+            neighbourhood,
+        })
+    }
+
+    /// The targets of some rows.
+    pub(super) fn targets(&self, rows: &[usize]) -> Array2<f64> {
+        self.targets.select(Axis(0), rows)
+    }
+
+    /// What the metric makes of errors at some rows, where it makes anything of them.
+    pub(super) fn weights(&self, rows: &[usize]) -> Option<Array1<f64>> {
+        let weights = self.weights.as_ref();
+        weights.map(|weights| weights.select(Axis(0), rows))
+    }
+
+    /// The rows that are left out in turn, fold by fold.
+    pub(super) fn folds(&self) -> &[Vec<usize>] {
+        &self.folds
+    }
+
+    /// All rows of the folds, in their order.
+    pub(super) fn judged(&self) -> &[usize] {
+        &self.judged
+    }
+
+    /// The rows that guesses are made from.
+    fn known_rows(&self) -> Vec<usize> {
+        self.known.iter().map(|&place| self.judged[place]).collect()
+    }
+
+    /// What the nearest measurements say of the targets at any pairs.
+    pub(super) fn neighbours_guess(&self, pairs: &[Pair]) -> Array2<f64> {
+        let targets = self.targets(&self.known_rows());
+        self.neighbourhood.guess(pairs, targets.view())
+    }
+
+    /// What anchors count where the targets have these variances about a network.
+    pub(super) fn anchor_weights(&self, variances: &[f64]) -> Array1<f64> {
+        let targets = self.targets(&self.known_rows());
+        self.anchors.weights(targets.view(), variances)
+    }
+
+    /// What the targets suggest at each anchor, by the rows in a place among the judged of which
+    /// `is_there`.
+    pub(super) fn guesses_of_targets(&self, is_there: impl Fn(usize) -> bool) -> Array2<f64> {
+        self.guesses(&self.targets, is_there)
+    }
+
+    /// What `targets`, of all rows, suggest at each anchor, by the known rows that are in a place among
+    /// the judged of which `is_there`.
+    pub(super) fn guesses(
+        &self,
+        targets: &Array2<f64>,
+        is_there: impl Fn(usize) -> bool,
+    ) -> Array2<f64> {
+        let targets = targets.select(Axis(0), &self.known_rows());
+        self.anchors
+            .targets(targets.view(), |known| is_there(self.known[known]))
+    }
+}
