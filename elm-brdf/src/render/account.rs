@@ -22,8 +22,6 @@ pub struct Savings {
     pub dim_lights: bool,
     /// Stop where more samples would not change a pixel visibly.
     pub samples: bool,
-    /// Evaluate a smaller network where its error stays below half a display step.
-    pub networks: bool,
 }
 
 impl Savings {
@@ -35,13 +33,11 @@ impl Savings {
         repeated: true,
         dim_lights: true,
         samples: true,
-        networks: true,
     };
     /// Those that leave the picture the same bit for bit.
     pub const LOSSLESS: Self = Self {
         dim_lights: false,
         samples: false,
-        networks: false,
         ..Self::ALL
     };
     /// Brute force.
@@ -53,14 +49,13 @@ impl Savings {
         ..Self::LOSSLESS
     };
     /// Their names, as [`without`](Self::without) reads them.
-    pub const NAMES: [&str; 7] = [
+    pub const NAMES: [&str; 6] = [
         "materials",
         "channels",
         "directions",
         "repeated",
         "dim-lights",
         "samples",
-        "networks",
     ];
 
     /// The same without one of them; `None` for a name that is none of [`NAMES`](Self::NAMES).
@@ -73,7 +68,6 @@ impl Savings {
             "repeated" => &mut self.repeated,
             "dim-lights" => &mut self.dim_lights,
             "samples" => &mut self.samples,
-            "networks" => &mut self.networks,
             _ => return None,
         };
         *flag = false;
@@ -100,9 +94,6 @@ pub struct Account {
     /// Evaluations left out, by reason. Those of stopped samples are counted at the rate of the
     /// samples before.
     pub skipped: BTreeMap<String, Work>,
-    /// Evaluations done by smaller networks, with the multiplications and additions that this
-    /// saved; the seconds are not known.
-    pub smaller_networks: Work,
     /// Materials that the scene defines.
     pub materials_defined: usize,
     /// Those that were loaded or trained, with their evaluations.
@@ -127,7 +118,6 @@ impl Account {
     /// Adds the work of a sheet's panel, whose materials are its own.
     pub(crate) fn merge(&mut self, other: &Self, panel: usize) {
         self.done.add(other.done);
-        self.smaller_networks.add(other.smaller_networks);
         for (reason, work) in &other.skipped {
             self.skipped.entry(reason.clone()).or_default().add(*work);
         }
@@ -203,8 +193,6 @@ impl Reason {
 pub(crate) struct Tally {
     /// Evaluations by material.
     pub(crate) evaluations: Vec<u64>,
-    /// Of these, by the smaller network.
-    pub(crate) small: Vec<u64>,
     /// Evaluations left out by [`Reason`] and material.
     skipped: [Vec<u64>; 7],
     pub(crate) samples: u64,
@@ -218,7 +206,6 @@ impl Tally {
     pub(crate) fn new(materials: usize) -> Self {
         Self {
             evaluations: vec![0; materials],
-            small: vec![0; materials],
             skipped: std::array::from_fn(|_| vec![0; materials]),
             ..Self::default()
         }
@@ -233,7 +220,6 @@ impl Tally {
             to.iter_mut().zip(from).for_each(|(sum, term)| *sum += term);
         };
         add(&mut self.evaluations, &other.evaluations);
-        add(&mut self.small, &other.small);
         for (to, from) in self.skipped.iter_mut().zip(&other.skipped) {
             add(to, from);
         }
@@ -245,12 +231,10 @@ impl Tally {
     }
 
     /// The account, given the names of the materials and the cost of one evaluation of each that
-    /// was loaded, by its model and by the smaller network.
-    pub(crate) fn account(&self, materials: &[(&str, Option<[usize; 2]>)]) -> Account {
+    /// was loaded.
+    pub(crate) fn account(&self, materials: &[(&str, Option<usize>)]) -> Account {
         let cost = |counts: &[u64]| -> u64 {
-            let costs = materials
-                .iter()
-                .map(|(_, cost)| cost.map_or(0, |[full, _]| full) as u64);
+            let costs = materials.iter().map(|(_, cost)| cost.unwrap_or(0) as u64);
             counts
                 .iter()
                 .zip(costs)
@@ -271,26 +255,8 @@ impl Tally {
                 seconds: evaluations as f64 * rate,
             }
         };
-        // What the smaller networks did is work done at their cost, and the rest of the model's
-        // cost is left out.
-        let saved: u64 = materials
-            .iter()
-            .zip(&self.small)
-            .map(|((_, cost), count)| {
-                let [full, small] = cost.unwrap_or_default();
-                count * full.saturating_sub(small) as u64
-            })
-            .sum();
-        let mut done = work(&self.evaluations);
-        done.multiply_adds -= saved;
-        let small = Work {
-            evaluations: self.small.iter().sum(),
-            multiply_adds: saved,
-            seconds: 0.0,
-        };
         Account {
-            done,
-            smaller_networks: small,
+            done: work(&self.evaluations),
             skipped: Reason::ALL
                 .into_iter()
                 .map(|(reason, name)| (name.to_owned(), work(&self.skipped[reason as usize])))
@@ -347,7 +313,6 @@ impl std::fmt::Display for Account {
             "number", "multiply-adds", "seconds"
         )?;
         line(f, "done", &self.done)?;
-        line(f, "of these, small", &self.smaller_networks)?;
         for (reason, work) in &self.skipped {
             line(f, reason, work)?;
         }

@@ -19,8 +19,6 @@ pub(crate) struct Request {
     pub(crate) light: usize,
     /// Factor on the value.
     pub(crate) weight: Rgb,
-    /// Whether the smaller network is enough.
-    pub(crate) small: bool,
     /// Whether the value counts; brute force evaluates also what does not.
     pub(crate) counts: bool,
 }
@@ -69,10 +67,10 @@ impl Batch {
         order.clear();
         order.extend(0..requests.len());
         // A stable sort: equal pairs are neighbours where a light and a view are the same.
-        let network = |at: usize| (requests[at].material, requests[at].small);
-        order.sort_by_key(|&at| (network(at), requests[at].light));
-        for group in order.chunk_by(|&a, &b| network(a) == network(b)) {
-            let (index, small) = network(group[0]);
+        let material_of = |at: usize| requests[at].material;
+        order.sort_by_key(|&at| (material_of(at), requests[at].light));
+        for group in order.chunk_by(|&a, &b| material_of(a) == material_of(b)) {
+            let index = material_of(group[0]);
             let material = shelf.get(index)?;
             let start = Instant::now();
             pairs.clear();
@@ -84,19 +82,12 @@ impl Batch {
                 }
                 pair_of.push(pairs.len() - 1);
             }
-            let found = if small {
-                material.eval_small(pairs)?
-            } else {
-                material.eval(pairs)?
-            };
+            let found = material.eval(pairs)?;
             // Without colour each channel is the same network again.
             let times = if material.channels() == 1 { 3 } else { 1 };
             let done = pairs.len() as u64;
             tally.skip(Reason::Repeated, index, group.len() as u64 - done);
             tally.evaluations[index] += done;
-            if small {
-                tally.small[index] += done;
-            }
             if savings.channels {
                 tally.skip(Reason::OneChannel, index, (times - 1) * done);
             } else {

@@ -2,7 +2,6 @@
 
 use ndarray::Array2;
 
-use super::economy::Economy;
 use super::proxy::{Proxy, Survey};
 use super::vector::{Rgb, largest, luminance, scaled, times};
 use crate::brdf::Brdf;
@@ -39,7 +38,6 @@ pub struct Material {
     albedo: f64,
     /// Factor that keeps the albedo from passing 1; 1 where that was not asked for or needed.
     scale: f64,
-    economy: Option<Economy>,
 }
 
 impl Material {
@@ -90,35 +88,7 @@ impl Material {
             proxy,
             albedo: largest_albedo,
             scale,
-            economy: None,
         })
-    }
-
-    /// Fits a smaller network to the model, for where its error cannot be seen.
-    pub(crate) fn economise(&mut self) -> Result<()> {
-        self.economy = Economy::new(&*self.brdf)?;
-        Ok(())
-    }
-
-    /// Whether the smaller network will do, as [`Economy::is_enough`].
-    pub(crate) fn small_is_enough(&self, pair: &Pair, weight: Rgb, gain: f64, steps: f64) -> bool {
-        let weight = times(weight, self.factor);
-        self.economy
-            .as_ref()
-            .is_some_and(|small| small.is_enough(pair, weight, gain, steps))
-    }
-
-    /// As [`eval`](Self::eval), by the smaller network if there is one.
-    pub(crate) fn eval_small(&self, pairs: &[Pair]) -> Result<Vec<Rgb>> {
-        let brdf = self.economy.as_ref().map_or(&*self.brdf, Economy::brdf);
-        self.eval_by(brdf, pairs)
-    }
-
-    /// Multiplications and additions of one evaluation by the smaller network.
-    pub(crate) fn small_multiply_adds(&self) -> usize {
-        self.economy
-            .as_ref()
-            .map_or(0, |small| small.brdf().multiply_adds())
     }
 
     /// BRDF in 1/sr of each pair, as linear red, green and blue.
@@ -126,11 +96,7 @@ impl Material {
     /// # Errors
     /// Whatever the model's own evaluation reports.
     pub fn eval(&self, pairs: &[Pair]) -> Result<Vec<Rgb>> {
-        self.eval_by(&*self.brdf, pairs)
-    }
-
-    fn eval_by(&self, brdf: &dyn Brdf, pairs: &[Pair]) -> Result<Vec<Rgb>> {
-        let mut values = rows(&brdf.eval(pairs)?, self.ceiling);
+        let mut values = rows(&self.brdf.eval(pairs)?, self.ceiling);
         for value in &mut values {
             *value = times(*value, self.factor);
         }
@@ -160,7 +126,7 @@ impl Material {
     }
 
     /// The largest directional albedo of any channel before any rescaling; above 1 the model
-    /// makes light of nothing.
+    /// creates energy.
     #[must_use]
     pub fn largest_albedo(&self) -> f64 {
         self.albedo

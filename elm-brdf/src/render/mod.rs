@@ -20,7 +20,6 @@ mod builtin;
 mod bvh;
 mod camera;
 mod distribution;
-mod economy;
 mod environment;
 pub(crate) mod error;
 mod film;

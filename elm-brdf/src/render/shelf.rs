@@ -13,8 +13,6 @@ use crate::error::{Error, Result};
 pub(crate) struct Shelf<'a> {
     scene: &'a Scene,
     supply: &'a dyn Supply,
-    /// Whether to fit smaller networks as well.
-    economise: bool,
     slots: Vec<Slot<'a>>,
 }
 
@@ -38,7 +36,7 @@ pub(crate) struct Stocked {
 }
 
 impl<'a> Shelf<'a> {
-    pub(crate) fn new(scene: &'a Scene, supply: &'a dyn Supply, economise: bool) -> Self {
+    pub(crate) fn new(scene: &'a Scene, supply: &'a dyn Supply) -> Self {
         let slot = |name| Slot {
             name,
             material: OnceLock::new(),
@@ -47,7 +45,6 @@ impl<'a> Shelf<'a> {
         Self {
             scene,
             supply,
-            economise,
             slots: scene
                 .material
                 .keys()
@@ -93,10 +90,7 @@ impl<'a> Shelf<'a> {
                 .into());
             }
             let supplied = self.supply.supply(definition, &dir)?;
-            let mut material = Material::new(supplied.brdf, tint, definition.conserve_energy)?;
-            if self.economise {
-                material.economise()?;
-            }
+            let material = Material::new(supplied.brdf, tint, definition.conserve_energy)?;
             Ok(Stocked {
                 material,
                 origin: supplied.origin,

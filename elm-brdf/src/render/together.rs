@@ -13,7 +13,6 @@ use super::account::{Reason, Savings, Tally};
 use super::batch::Batch;
 use super::error::SceneError;
 use super::film::Film;
-use super::material::Material;
 use super::scene::{Image, Scene};
 use super::shelf::Shelf;
 use super::supply::Supply;
@@ -32,8 +31,6 @@ const TILE: u32 = 32;
 const FIRST_SAMPLES: u32 = 4;
 /// Samples of every pixel between looks, so that a tile's samples take a few megabytes.
 const MOST_SAMPLES: u32 = 64;
-/// Samples of a picture from which on it is worth fitting smaller networks.
-const SAMPLES_WORTH_ECONOMY: u64 = 1 << 19;
 
 /// A difference of two pictures that will be shown, enlarged.
 #[derive(Debug, Clone, Copy)]
@@ -66,8 +63,6 @@ pub(crate) fn render(
             reason: reason.to_string(),
         })?;
     let mut savings = options.savings;
-    // A smaller network's error is known in the picture, but not in a difference, which is dark.
-    savings.networks &= differences.is_empty();
     // Samples are compared one by one.
     let alike = |a: &Image, b: &Image| (a.samples, a.seed) == (b.samples, b.seed);
     savings.samples &= differences.is_empty()
@@ -80,14 +75,7 @@ pub(crate) fn render(
         .collect::<Result<Vec<_>, _>>()?;
     let shelves: Vec<Shelf<'_>> = scenes
         .iter()
-        .map(|scene| {
-            let image = &scene.image;
-            let samples =
-                u64::from(image.width) * u64::from(image.height) * u64::from(image.samples);
-            // A smaller network pays for its own fitting only in a picture of some size.
-            let economise = savings.networks && samples >= SAMPLES_WORTH_ECONOMY;
-            Shelf::new(scene, supply, economise)
-        })
+        .map(|scene| Shelf::new(scene, supply))
         .collect();
     if !savings.materials {
         shelves.iter().try_for_each(Shelf::fill)?;
@@ -277,7 +265,6 @@ impl<'a> Picture<'a> {
                 // Steps of 8-bit sRGB where its slope is steepest, 12.92 at black.
                 tolerance: STEPS / (255.0 * 12.92 * gain * enlarged),
                 gain,
-                steps: STEPS,
             },
             film: Mutex::new(Film::new(image.width, image.height)),
             tally: Mutex::new(Tally::new(world.materials.len())),
@@ -327,10 +314,9 @@ impl<'a> Picture<'a> {
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner);
         let shelf = self.tracer.shelf;
-        let cost = |m: &Material| [m.multiply_adds(), m.small_multiply_adds()];
-        let materials: Vec<(&str, Option<[usize; 2]>)> = shelf
+        let materials: Vec<(&str, Option<usize>)> = shelf
             .stocked()
-            .map(|(name, stocked)| (name, stocked.map(|s| cost(&s.material))))
+            .map(|(name, stocked)| (name, stocked.map(|s| s.material.multiply_adds())))
             .collect();
         let mut account = tally.account(&materials);
         account.savings = Some(self.tracer.savings);

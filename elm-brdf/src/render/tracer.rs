@@ -38,8 +38,6 @@ pub(crate) struct Tracer<'a> {
     pub(crate) tolerance: f64,
     /// Factor on the radiance before display.
     pub(crate) gain: f64,
-    /// What a sample may lose by smaller networks, in display steps.
-    pub(crate) steps: f64,
 }
 
 /// What a sample of a pixel found.
@@ -335,18 +333,12 @@ impl Tracer<'_> {
             _ => 1.0,
         };
         let weight = scaled(times(path.throughput, arriving), cosine * share);
-        // The first surface's own light adds up over the lights, each with its share of the bound.
-        let steps = self.steps / self.world.lights.len() as f64;
-        let small = self.savings.networks
-            && surface == 0
-            && material.small_is_enough(&pair, weight, self.gain, steps);
         Ok(Some(Request {
             material: vertex.material,
             pair,
             path: 0,
             light,
             weight,
-            small,
             counts: reason.is_none(),
         }))
     }
@@ -409,7 +401,6 @@ impl Tracer<'_> {
             path: 0,
             light: SCATTERED,
             weight: [factor; 3],
-            small: false,
             counts: reason.is_none(),
         }))
     }
