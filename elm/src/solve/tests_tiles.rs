@@ -122,8 +122,16 @@ impl<A: Scalar> Problem<A> {
             close(&d.degrees_of_freedom, &e.degrees_of_freedom, bound, name);
             close(&d.residual_norm, &e.residual_norm, 1e-6, name);
             if let (Some(d), Some(e)) = (&d.leave_one_out, &e.leave_one_out) {
-                // 1.6e-6 was seen at a condition of 1e7 on OpenBLAS; not derived.
-                close(d, e, 1e-5, name);
+                // What fits without a row predict for it is off by `bound` of the largest target, as
+                // predictions are: their problems are conditioned no worse. 1.6e-6 has been seen (a
+                // condition of 1e7, OpenBLAS), where that allows 1e-3; 1e-5 keeps the test sharp.
+                let targets = self.wide().targets;
+                for (output, (&one, &other)) in d.iter().zip(e).enumerate() {
+                    let column = targets.column(output);
+                    let largest = column.fold(0.0, |m: f64, t| m.max(t.abs()));
+                    let allowed = (bound * largest / other).clamp(1e-6, 1e-5);
+                    close(&[one], &[other], allowed, name);
+                }
             } else {
                 assert_eq!(d.leave_one_out, e.leave_one_out);
             }
