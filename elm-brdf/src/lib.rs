@@ -49,5 +49,6 @@ pub mod reference;
 pub mod render;
 pub mod report;
 mod scales;
+mod streams;
 
 pub use error::{Error, Result};

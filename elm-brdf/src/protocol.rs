@@ -1,10 +1,9 @@
 //! k-fold cross-validation of anything that can be fitted to measurements.
 
+use elm::Stream;
 use elm_datasets::{Directions, Material, MaterialId, Measurements, Samples};
 use ndarray::{Array2, ArrayView2, Axis, Slice, concatenate};
-use rand::SeedableRng;
 use rand::seq::SliceRandom;
-use rand_chacha::ChaCha8Rng;
 
 use crate::brdf::{Brdf, Fit};
 use crate::error::{Error, Result};
@@ -13,6 +12,7 @@ use crate::metrics::{Comparison, Metrics, Truth};
 use crate::model::SideBySide;
 use crate::prior::{Prior, PriorParams};
 use crate::quality::{self, NoiseFloor};
+use crate::streams::generator;
 
 /// Which fold each measurement is held out in: a seeded shuffle, dealt into folds whose sizes
 /// differ by at most one.
@@ -32,9 +32,7 @@ impl Folds {
             return Err(Error::Folds { folds: count, rows });
         }
         let mut order: Vec<usize> = (0..rows).collect();
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        // The hidden layer is drawn from stream 0 of the same seed.
-        random.set_stream(1);
+        let mut random = generator(seed, Stream::Folds);
         order.shuffle(&mut random);
         let mut of_row = vec![0; rows];
         for (place, row) in order.into_iter().enumerate() {

@@ -48,7 +48,7 @@ use crate::bounds::Bounds;
 use crate::check::{check_length, check_matrix, check_weights};
 use crate::error::{Error, Result};
 use crate::feature_map::{FeatureMap, HiddenLayer, Scaler};
-use crate::linalg::Triangular;
+use crate::linalg::QrFactor;
 use crate::memory::check_room;
 use crate::model::{CheckedParams, Targets};
 use crate::network::Elm;
@@ -464,7 +464,7 @@ impl<A: Scalar> Accumulator<A> {
             bottom.assign(&rows.column(column).mapv(|v| v / *scale));
         }
         let nothing = Array2::zeros((both.nrows(), 0));
-        let Triangular { r, .. } = A::triangularise(both.view(), nothing.view())?;
+        let QrFactor { r, .. } = A::triangularise(both.view(), nothing.view())?;
         if !r.iter().all(|v| v.is_finite()) {
             return Err(OVERFLOW);
         }

@@ -66,6 +66,7 @@ mod scalar;
 mod simd;
 pub mod solve;
 mod stats;
+mod stream;
 pub mod tune;
 pub mod uncertainty;
 pub mod validate;
@@ -83,6 +84,7 @@ pub use model::{CheckedParams, ElmParams, Targets};
 pub use network::Elm;
 pub use predictor::{Predictor, Scratch};
 pub use scalar::Scalar;
+pub use stream::Stream;
 pub use tune::Tuner;
 pub use uncertainty::UncertainElm;
 

@@ -62,12 +62,12 @@ use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, concatenate, s};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::linalg::{Kernel, Triangular};
+use crate::linalg::{Backend, QrFactor};
 use crate::network::Elm;
 use crate::scalar::Scalar;
-use crate::solve::frame::{Frame, Prepared};
+use crate::solve::design_svd::DesignSvd;
+use crate::solve::equilibration::{Equilibration, Prepared};
 use crate::solve::lanczos::largest_eigenvalue;
-use crate::solve::spectrum::Spectrum;
 use crate::solve::symmetric::Symmetric;
 use crate::solve::{Lambda, LeastSquares, Ridge};
 
@@ -214,27 +214,30 @@ impl Root {
             targets,
             frame,
         } = prepared;
-        let (hidden, targets, unreached) = if hidden.nrows() > hidden.ncols() {
-            let Triangular { r, qtb, unreached } =
-                f64::triangularise(hidden.view(), targets.view())?;
-            (r, qtb, unreached)
+        let (hidden, targets, residual_ss) = if hidden.nrows() > hidden.ncols() {
+            let QrFactor {
+                r,
+                qtb,
+                residual_ss,
+            } = f64::triangularise(hidden.view(), targets.view())?;
+            (r, qtb, residual_ss)
         } else {
             let none = Array1::zeros(targets.ncols());
             (hidden.clone(), targets.clone(), none)
         };
         let lengths = targets.columns().into_iter().map(|t| t.dot(&t));
-        let squares = lengths.collect::<Array1<f64>>() + &unreached;
+        let squares = lengths.collect::<Array1<f64>>() + &residual_ss;
         // The relative strength and what it is relative to; nothing where no column varies.
         let strength = if let Lambda::Relative(relative) = ridge.lambda() {
             let gram = Symmetric::of_lower(&f64::gram(hidden.view()));
             largest_eigenvalue(&gram).map(|largest| (relative, largest))
         } else {
-            let triangle = Triangular {
+            let triangle = QrFactor {
                 r: hidden.clone(),
                 qtb: targets.clone(),
-                unreached,
+                residual_ss,
             };
-            let spectrum = Spectrum::of_triangle(triangle, frame.clone())?;
+            let spectrum = DesignSvd::of_triangle(triangle, frame.clone())?;
             let relative = ridge.shared(true).strengths_without_rows(&spectrum);
             let relative = relative.first().copied().unwrap_or(FLOOR);
             spectrum.s.first().map(|s| (relative, s * s))
@@ -251,7 +254,7 @@ impl Root {
     }
 
     /// The triangle of these columns over the root of the ridge, and the targets in it.
-    fn triangle(&self, columns: &[usize]) -> Result<Triangular<f64>> {
+    fn triangle(&self, columns: &[usize]) -> Result<QrFactor<f64>> {
         let ridge = Array2::from_diag_elem(columns.len(), self.lambda.sqrt());
         let nothing = Array2::zeros((columns.len(), self.targets.ncols()));
         let hidden = self.hidden.select(Axis(1), columns);
@@ -289,7 +292,7 @@ struct Elimination<'a> {
 
 impl<'a> Elimination<'a> {
     fn new(root: &'a Root, columns: Vec<usize>) -> Result<Self> {
-        let Triangular { r, qtb, .. } = root.triangle(&columns)?;
+        let QrFactor { r, qtb, .. } = root.triangle(&columns)?;
         let upper = inverse(r.view())?;
         Ok(Self {
             root,
@@ -359,7 +362,7 @@ fn leave_one_out_scores(
         targets,
         frame,
     } = prepared;
-    let Triangular { r, qtb, .. } = root.triangle(order)?;
+    let QrFactor { r, qtb, .. } = root.triangle(order)?;
     let upper = inverse(r.view())?;
     let constants = constant_shares(frame);
     let mut squares: Array2<f64> = Array2::zeros((order.len() + 1 - first, targets.ncols()));
@@ -393,7 +396,7 @@ fn leave_one_out_scores(
 }
 
 /// The leverage that an intercept gives each row.
-fn constant_shares(frame: &Frame<f64>) -> Vec<f64> {
+fn constant_shares(frame: &Equilibration<f64>) -> Vec<f64> {
     let direction = frame.constant_direction();
     direction.iter().map(|share| share * share).collect()
 }

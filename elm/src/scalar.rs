@@ -5,12 +5,12 @@ use std::iter::Sum;
 use ndarray::{ArrayView, CowArray, Dimension, NdFloat};
 use serde::{Serialize, de::DeserializeOwned};
 
-use crate::linalg::Kernel;
+use crate::linalg::Backend;
 use crate::simd::Coefficients;
 
 /// `f32` or `f64`. Sealed: the linear algebra and the vector code behind it exist for these
 /// two.
-pub trait Scalar: NdFloat + Kernel + Coefficients + Sum + Serialize + DeserializeOwned {
+pub trait Scalar: NdFloat + Backend + Coefficients + Sum + Serialize + DeserializeOwned {
     /// The type's name, `"f32"` or `"f64"`.
     const NAME: &'static str;
 

@@ -106,7 +106,7 @@ impl<A: Scalar> Member<A> {
     /// (rows, outputs); `hidden` is this member's hidden-layer matrix.
     fn spread(&self, hidden: &Array2<A>) -> Array2<A> {
         let lambda = &self.model.diagnosis().lambda;
-        self.validator.posterior_spread(hidden, lambda)
+        self.validator.variance_factor(hidden, lambda)
     }
 }
 
@@ -209,7 +209,7 @@ impl<A: Scalar> CheckedParams<A> {
             .to_owned();
         // At a training row the posterior's share of the variance is the leverage.
         let freedom = validator
-            .posterior_spread(&hidden, &model.diagnosis().lambda)
+            .variance_factor(&hidden, &model.diagnosis().lambda)
             .mapv_into(|leverage| (A::one() - leverage).max(A::epsilon()));
         Ok(Member {
             model,
@@ -411,7 +411,7 @@ impl<A: Scalar> UncertainElm<A> {
                 for (member, hidden) in self.members.iter().zip(&hidden) {
                     let lambda = member.model.diagnosis().lambda[output];
                     let here = hidden.slice(s![row..=row, ..]);
-                    let pull = member.validator.pull(&here, lambda);
+                    let pull = member.validator.influence(&here, lambda);
                     Zip::from(&mut moves)
                         .and(&mut halves)
                         .and(&pull)

@@ -43,17 +43,16 @@ mod fold;
 mod held_out;
 
 use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, Axis, Zip};
-use rand::SeedableRng;
 use rand::seq::SliceRandom;
-use rand_chacha::ChaCha8Rng;
 
 use crate::check::check_length;
 use crate::error::{Error, Result};
 use crate::memory::check_room;
 use crate::scalar::Scalar;
+use crate::solve::design_svd::{DesignSvd, DesignSvdWithRows};
 use crate::solve::ridge::answer;
-use crate::solve::spectrum::{RowSpectrum, Spectrum};
 use crate::solve::{LeastSquares, Reason, Ridge, Solution, in_range};
+use crate::stream::Stream;
 pub use fits::FoldFit;
 use fold::Fold;
 pub use held_out::{HeldOut, Path};
@@ -84,7 +83,7 @@ pub use held_out::{HeldOut, Path};
 /// ```
 #[derive(Debug, Clone)]
 pub struct Validator<A: Scalar> {
-    rows: RowSpectrum<A>,
+    rows: DesignSvdWithRows<A>,
     /// As given, shape (rows, outputs).
     targets: Array2<A>,
     /// Weighted, centred and scaled, as the factorisation saw them.
@@ -100,7 +99,7 @@ impl<A: Scalar> Validator<A> {
     /// # Errors
     /// [`Error::NoConvergence`] from the factorisation.
     pub fn new(problem: &LeastSquares<'_, A>) -> Result<Self> {
-        let rows = RowSpectrum::new(problem)?;
+        let rows = DesignSvdWithRows::new(problem)?;
         let spectrum = &rows.spectrum;
         let frame = &spectrum.frame;
         let inner_targets = A::product(rows.u.view(), spectrum.c.view()) + &rows.residual;
@@ -166,7 +165,7 @@ impl<A: Scalar> Validator<A> {
     /// Coordinates of new hidden rows: centred, scaled, along the right singular vectors (shape
     /// (rows, $k$)), and the squared length that lies outside them.
     fn coordinates(&self, hidden: &ArrayRef2<A>) -> (Array2<A>, Array1<A>) {
-        let Spectrum { frame, vt, .. } = &self.rows.spectrum;
+        let DesignSvd { frame, vt, .. } = &self.rows.spectrum;
         // Scaled before centring, as the difference of two huge values may overflow.
         let scaled = hidden / frame.hidden_scale;
         let centred = scaled - frame.hidden_mean.mapv(|m| m / frame.hidden_scale);
@@ -190,7 +189,7 @@ impl<A: Scalar> Validator<A> {
 
     /// $1/n + \tilde h^T (\tilde H^T \tilde H + \lambda)^{-1} \tilde h$ for each new hidden row and each
     /// output's relative strength, shape (rows, outputs).
-    pub(crate) fn posterior_spread(&self, hidden: &ArrayRef2<A>, lambda: &[f64]) -> Array2<A> {
+    pub(crate) fn variance_factor(&self, hidden: &ArrayRef2<A>, lambda: &[f64]) -> Array2<A> {
         let (inside, outside) = self.coordinates(hidden);
         let s = &self.rows.spectrum.s;
         let largest = s.first().copied().unwrap_or(A::zero());
@@ -220,7 +219,7 @@ impl<A: Scalar> Validator<A> {
     /// $1/n + \tilde h^T (\tilde H^T \tilde H + \lambda)^{-1} \tilde h_i$ for one new hidden row and every
     /// training row $i$: leaving out row $i$ lowers the prediction by its leave-one-out residual
     /// times this.
-    pub(crate) fn pull(&self, hidden: &ArrayRef2<A>, lambda: f64) -> Array1<A> {
+    pub(crate) fn influence(&self, hidden: &ArrayRef2<A>, lambda: f64) -> Array1<A> {
         let (inside, _) = self.coordinates(hidden);
         let gain = self.rows.spectrum.ridge_gain(&[A::from_f64(lambda)]);
         let along = &inside.row(0) * &gain.column(0);
@@ -237,8 +236,8 @@ impl<A: Scalar> Validator<A> {
         let spectrum = &self.rows.spectrum;
         let squared = self.rows.u.mapv(|u| u * u);
         self.held_out(lambda, |strength, outputs, inner| {
-            let held_back = spectrum.ridge_held_back(strength);
-            let denominators = squared.dot(&held_back) + &self.rows.free;
+            let complements = spectrum.filter_complements(strength);
+            let denominators = squared.dot(&complements) + &self.rows.free;
             let least = self.singular_level(strength).powi(2);
             let lone = !spectrum.can_lose_a_row();
             for (row, &denominator) in denominators.iter().enumerate() {
@@ -251,7 +250,7 @@ impl<A: Scalar> Validator<A> {
             let residual = self.rows.residual.select(Axis(1), outputs);
             inner.assign(&self.rows.leave_one_out(
                 &denominators,
-                &held_back,
+                &complements,
                 c.view(),
                 residual.view(),
             ));
@@ -465,6 +464,6 @@ pub fn assign_folds(rows: usize, folds: usize, seed: u64) -> Result<Vec<usize>> 
     }
     check_room("the fold labels", rows, 1)?;
     let mut labels: Vec<usize> = (0..rows).map(|row| row % folds).collect();
-    labels.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+    labels.shuffle(&mut Stream::Folds.of(seed));
     Ok(labels)
 }

@@ -1,13 +1,12 @@
 //! Methods that take no more than so many measurements.
 
 use ndarray::{ArrayView2, Axis};
-use rand::SeedableRng;
 use rand::seq::index;
-use rand_chacha::ChaCha8Rng;
 
 use crate::brdf::{Brdf, Fit};
 use crate::error::Result;
 use crate::geometry::Pair;
+use crate::streams::{self, generator};
 
 /// A method that is fitted to a random subset where there are more measurements than it can
 /// afford: dense kernel matrices grow with the square of the rows, their decompositions with the
@@ -25,9 +24,7 @@ impl Fit for Thinned {
         if pairs.len() <= self.most || pairs.len() != values.nrows() {
             return self.method.fit(pairs, values);
         }
-        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        // Streams 0 and 1 draw hidden layers and folds.
-        random.set_stream(2);
+        let mut random = generator(self.seed, streams::SUBSAMPLE);
         let mut rows = index::sample(&mut random, pairs.len(), self.most).into_vec();
         rows.sort_unstable();
         let kept: Vec<Pair> = rows.iter().map(|&row| pairs[row]).collect();

@@ -4,14 +4,14 @@ use ndarray::{Array1, ArrayView1, Axis, s};
 
 use super::Accumulator;
 use crate::error::Result;
-use crate::linalg::Triangular;
+use crate::linalg::QrFactor;
 use crate::scalar::{Scalar, power_of_two};
-use crate::solve::frame::Frame;
-use crate::solve::spectrum::Spectrum;
+use crate::solve::design_svd::DesignSvd;
+use crate::solve::equilibration::Equilibration;
 
 impl<A: Scalar> Accumulator<A> {
     /// The problem in the coordinates of its singular vectors, as a batch fit has it.
-    pub(super) fn spectrum(&self) -> Result<Spectrum<A>> {
+    pub(super) fn spectrum(&self) -> Result<DesignSvd<A>> {
         let extra = usize::from(self.intercept);
         let neurons = self.columns() - self.outputs - extra;
         let (hidden, targets) = (extra..extra + neurons, extra + neurons..);
@@ -87,7 +87,7 @@ impl<A: Scalar> Accumulator<A> {
         } else {
             A::one()
         };
-        let frame = Frame {
+        let frame = Equilibration {
             rows,
             weighted_rows: usize::try_from(self.weighted_rows).unwrap_or(usize::MAX),
             intercept: self.intercept,
@@ -99,11 +99,11 @@ impl<A: Scalar> Accumulator<A> {
             hidden_scale,
             target_scale,
         };
-        let triangle = Triangular {
+        let triangle = QrFactor {
             r: h,
             qtb: t,
-            unreached: rest.map_axis(Axis(0), |column| column.dot(&column)),
+            residual_ss: rest.map_axis(Axis(0), |column| column.dot(&column)),
         };
-        Spectrum::of_triangle(triangle, frame)
+        DesignSvd::of_triangle(triangle, frame)
     }
 }

@@ -1,7 +1,7 @@
 //! Drawing the random layer from a seed.
 
 use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, s};
-use rand::{Rng, SeedableRng};
+use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{StandardNormal, StandardUniform};
 
@@ -15,14 +15,7 @@ use crate::error::{Error, Result};
 use crate::memory::check_room;
 use crate::scalar::Scalar;
 use crate::stats::Sum;
-
-/// Of the streams of random numbers that a group has, apart from those of other groups.
-const STREAMS: u64 = 4;
-/// The weights of a group.
-const WEIGHTS: u64 = 0;
-/// The rows that biases or centres are laid on: a stream of its own, so that the weights are those
-/// of the other choices.
-const ROWS: u64 = 2;
+use crate::stream::Stream;
 
 /// Training inputs, standardised where they are looked at: a layer is laid on few of many rows.
 #[derive(Clone, Copy)]
@@ -133,21 +126,19 @@ impl<A: Scalar> FeatureMapParams<A> {
             groups: Vec::new(),
         };
         let mut first = 0;
-        for (stream, group) in (0..).step_by(STREAMS as usize).zip(self.groups()) {
+        for (index, group) in (0..).zip(self.groups()) {
             let columns = first..first + group.count;
             first = columns.end;
             if columns.is_empty() {
                 continue;
             }
-            let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-            random.set_stream(stream + WEIGHTS);
             let (weights, biases, radial) = match group.kind {
                 Kind::Projection => {
-                    let (weights, biases) = self.projections(x, &places, group, stream, random);
+                    let (weights, biases) = self.projections(x, &places, group, index);
                     (weights, biases, None)
                 }
                 Kind::Radial => {
-                    random.set_stream(stream + ROWS);
+                    let mut random = Stream::Rows(index).of(self.seed);
                     let (centres, scales) = self.centres(x, &places, group, &mut random);
                     (centres, Array1::zeros(group.count), Some(scales))
                 }
@@ -175,10 +166,10 @@ impl<A: Scalar> FeatureMapParams<A> {
         x: Inputs<'_, A>,
         places: &Places,
         group: &Neurons<A>,
-        stream: u64,
-        mut random: ChaCha8Rng,
+        index: u32,
     ) -> (Array2<A>, Array1<A>) {
         let inputs = x.ncols();
+        let mut random = Stream::Weights(index).of(self.seed);
         // Of a neuron one row: its weights, its bias, and what chi-square is made of.
         let more = match self.distribution {
             Distribution::StudentT(freedom) => usize::from(freedom),
@@ -206,8 +197,7 @@ impl<A: Scalar> FeatureMapParams<A> {
             Biases::AsWeights => drawn(scale),
             Biases::Scaled(scale) => drawn(scale),
             Biases::OnData => {
-                random = ChaCha8Rng::seed_from_u64(self.seed);
-                random.set_stream(stream + ROWS);
+                let mut random = Stream::Rows(index).of(self.seed);
                 let rows = weights
                     .columns()
                     .into_iter()

@@ -22,7 +22,7 @@ use ndarray::{Array1, Array2, ArrayView2, Axis, CowArray, Ix2, ShapeBuilder, s};
 use num_traits::Zero;
 use pulp::{Simd, WithSimd};
 
-use super::{Failure, Kernel, Positive, Svd, Triangular};
+use super::{Backend, CholeskySolve, Failure, QrFactor, Svd};
 use crate::simd::{Lanes, Level, Real};
 
 const PAR: Par = Par::Seq;
@@ -132,7 +132,7 @@ fn singular_values<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>) -> Result<A
 fn triangularise<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
     a: ArrayView2<'_, A>,
     b: ArrayView2<'_, A>,
-) -> Triangular<A> {
+) -> QrFactor<A> {
     let (rows, columns) = a.dim();
     let mut basis = by_columns(a);
     let block = qr::factor::recommended_block_size::<A>(rows, columns);
@@ -153,13 +153,13 @@ fn triangularise<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
     let r = Array2::from_shape_fn((columns, columns), |(i, j)| {
         if i <= j { basis[[i, j]] } else { A::zero() }
     });
-    let unreached = qtb.slice(s![columns.., ..]).map_axis(Axis(0), |column| {
+    let residual_ss = qtb.slice(s![columns.., ..]).map_axis(Axis(0), |column| {
         column.iter().fold(A::zero(), |sum, &v| sum + v * v)
     });
-    Triangular {
+    QrFactor {
         r,
         qtb: qtb.slice(s![..columns, ..]).to_owned(),
-        unreached,
+        residual_ss,
     }
 }
 
@@ -363,7 +363,7 @@ fn add_gram_of<A: RealField + Copy>(a: MatRef<'_, A>, sum: MatMut<'_, A>) {
 fn solve_positive<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
     a: ArrayView2<'_, A>,
     b: ArrayView2<'_, A>,
-) -> Result<Positive<A>, Failure> {
+) -> Result<CholeskySolve<A>, Failure> {
     let n = a.nrows();
     let mut factor = by_columns(a);
     let mut x = by_columns(b);
@@ -383,7 +383,7 @@ fn solve_positive<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
     let mut inverse = Array2::zeros((n, n).f());
     invert_lower_triangular(view_mut(&mut inverse), lower, PAR);
     let inverse_trace = inverse.iter().fold(A::zero(), |sum, &v| sum + v * v);
-    Ok(Positive { x, inverse_trace })
+    Ok(CholeskySolve { x, inverse_trace })
 }
 
 /// Passes a result on with the upper halves of vector registers clear.
@@ -411,7 +411,7 @@ fn clean<T>(result: T) -> T {
 
 macro_rules! kernel {
     ($($scalar:ty),*) => {$(
-        impl Kernel for $scalar {
+        impl Backend for $scalar {
             fn product(a: ArrayView2<'_, Self>, b: ArrayView2<'_, Self>) -> Array2<Self> {
                 clean(product(a, b))
             }
@@ -427,7 +427,7 @@ macro_rules! kernel {
             fn triangularise(
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
-            ) -> Result<Triangular<Self>, Failure> {
+            ) -> Result<QrFactor<Self>, Failure> {
                 Ok(clean(triangularise(a, b)))
             }
 
@@ -456,7 +456,7 @@ macro_rules! kernel {
             fn solve_positive(
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
-            ) -> Result<Positive<Self>, Failure> {
+            ) -> Result<CholeskySolve<Self>, Failure> {
                 clean(solve_positive(a, b))
             }
         }

@@ -12,7 +12,7 @@ use ndarray_linalg::{
 };
 use num_traits::Zero;
 
-use super::{Failure, Kernel, Positive, Svd, Triangular};
+use super::{Backend, CholeskySolve, Failure, QrFactor, Svd};
 
 #[allow(unsafe_code)]
 unsafe extern "C" {
@@ -58,12 +58,16 @@ fn decompose<A: Lapack<Real = A>>(a: ArrayView2<'_, A>) -> Result<Svd<A>, Failur
 fn triangularise<A: Lapack<Real = A>>(
     a: ArrayView2<'_, A>,
     b: ArrayView2<'_, A>,
-) -> Result<Triangular<A>, Failure> {
+) -> Result<QrFactor<A>, Failure> {
     let (q, r) = by_rows(a).qr_into().map_err(no_convergence)?;
     let qtb = q.t().dot(&b);
     let rest = &b - &q.dot(&qtb);
-    let unreached = rest.map_axis(Axis(0), |column| column.iter().map(|v| v.square()).sum());
-    Ok(Triangular { r, qtb, unreached })
+    let residual_ss = rest.map_axis(Axis(0), |column| column.iter().map(|v| v.square()).sum());
+    Ok(QrFactor {
+        r,
+        qtb,
+        residual_ss,
+    })
 }
 
 fn solve_upper<A: Lapack<Real = A>>(
@@ -90,7 +94,7 @@ fn solve_square<A: Lapack<Real = A>>(
 fn solve_positive<A: Lapack<Real = A>>(
     a: ArrayView2<'_, A>,
     b: ArrayView2<'_, A>,
-) -> Result<Positive<A>, Failure> {
+) -> Result<CholeskySolve<A>, Failure> {
     let lower: Array2<A> = by_rows(a).cholesky_into(UPLO::Lower).map_err(pivot)?;
     // With A = L L^T the trace of the inverse is the sum of squares of L^-1.
     let inverse = lower
@@ -100,7 +104,7 @@ fn solve_positive<A: Lapack<Real = A>>(
     let half = lower
         .solve_triangular(UPLO::Lower, Diag::NonUnit, &by_rows(b))
         .map_err(pivot)?;
-    Ok(Positive {
+    Ok(CholeskySolve {
         x: upper
             .solve_triangular(UPLO::Upper, Diag::NonUnit, &half)
             .map_err(pivot)?,
@@ -110,7 +114,7 @@ fn solve_positive<A: Lapack<Real = A>>(
 
 macro_rules! kernel {
     ($($scalar:ty),*) => {$(
-        impl Kernel for $scalar {
+        impl Backend for $scalar {
             fn product(a: ArrayView2<'_, Self>, b: ArrayView2<'_, Self>) -> Array2<Self> {
                 sequential();
                 a.dot(&b)
@@ -129,7 +133,7 @@ macro_rules! kernel {
             fn triangularise(
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
-            ) -> Result<Triangular<Self>, Failure> {
+            ) -> Result<QrFactor<Self>, Failure> {
                 sequential();
                 triangularise(a, b)
             }
@@ -158,7 +162,7 @@ macro_rules! kernel {
             fn solve_positive(
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
-            ) -> Result<Positive<Self>, Failure> {
+            ) -> Result<CholeskySolve<Self>, Failure> {
                 sequential();
                 solve_positive(a, b)
             }

@@ -39,19 +39,19 @@ pub struct Svd<A> {
 
 /// A least-squares problem $\min \|AX - B\|$ reduced to its triangle by $A = QR$.
 #[derive(Debug, Clone)]
-pub struct Triangular<A> {
+pub struct QrFactor<A> {
     /// $R$, square, zero below the diagonal.
     pub r: Array2<A>,
     /// $Q^T B$, shape (columns of $A$, columns of $B$).
     pub qtb: Array2<A>,
     /// For each column of $B$, the sum of squares of the part that no combination of $A$'s
     /// columns reaches.
-    pub unreached: Array1<A>,
+    pub residual_ss: Array1<A>,
 }
 
 /// The answer of a symmetric positive definite system.
 #[derive(Debug, Clone)]
-pub struct Positive<A> {
+pub struct CholeskySolve<A> {
     /// The solution, as many columns as the right-hand side.
     pub x: Array2<A>,
     /// The trace of the inverse, the sum of 1 / eigenvalue: at least the norm of the inverse, at
@@ -71,7 +71,7 @@ pub enum Failure {
 /// What a back end provides for one scalar type.
 ///
 /// Not public: it is named by the sealed [`Scalar`](crate::Scalar) alone.
-pub trait Kernel: Sized {
+pub trait Backend: Sized {
     /// $A B$.
     fn product(a: ArrayView2<'_, Self>, b: ArrayView2<'_, Self>) -> Array2<Self>;
 
@@ -85,7 +85,7 @@ pub trait Kernel: Sized {
     fn triangularise(
         a: ArrayView2<'_, Self>,
         b: ArrayView2<'_, Self>,
-    ) -> Result<Triangular<Self>, Failure>;
+    ) -> Result<QrFactor<Self>, Failure>;
 
     /// Solves $R X = B$ for square $R$, of which the upper half is read.
     fn solve_upper(
@@ -119,7 +119,7 @@ pub trait Kernel: Sized {
     fn solve_positive(
         a: ArrayView2<'_, Self>,
         b: ArrayView2<'_, Self>,
-    ) -> Result<Positive<Self>, Failure>;
+    ) -> Result<CholeskySolve<Self>, Failure>;
 }
 
 #[cfg(test)]
@@ -205,7 +205,11 @@ mod tests {
     fn triangularise_keeps_norms_and_normal_equations() {
         for (rows, columns) in [(1, 1), (5, 5), (40, 7), (600, 60)] {
             let (a, b) = (random(rows, columns, 3), random(rows, 4, 4));
-            let Triangular { r, qtb, unreached } = f64::triangularise(a.view(), b.view()).unwrap();
+            let QrFactor {
+                r,
+                qtb,
+                residual_ss,
+            } = f64::triangularise(a.view(), b.view()).unwrap();
             for ((i, j), &value) in r.indexed_iter() {
                 assert!(i <= j || value == 0.0, "below the diagonal");
             }
@@ -213,7 +217,7 @@ mod tests {
             assert_abs_diff_eq!(r.t().dot(&qtb), a.t().dot(&b), epsilon = 1e-11);
             let reached = (&qtb * &qtb).sum_axis(Axis(0));
             assert_abs_diff_eq!(
-                reached + unreached,
+                reached + residual_ss,
                 (&b * &b).sum_axis(Axis(0)),
                 epsilon = 1e-10
             );

@@ -10,7 +10,7 @@ use crate::feature_map::{FeatureMap, FeatureRows};
 use crate::memory::{check_copies, check_room};
 use crate::network::Elm;
 use crate::scalar::Scalar;
-use crate::solve::moments::{HiddenRows, RowSource};
+use crate::solve::normal_equations::{HiddenRows, RowSource};
 use crate::solve::{LeastSquares, Solver};
 use crate::validate::{FoldFit, HeldOut, Validator};
 

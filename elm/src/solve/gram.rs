@@ -7,19 +7,19 @@
 //! arithmetic of QR and a small part of its memory traffic. A matrix with fewer rows than neurons
 //! is answered from $\tilde H \tilde H^T$ (the dual form):
 //! $\beta = \tilde H^T (\tilde H \tilde H^T + \lambda s_1^2 I)^{-1} \tilde T$. With at least as many rows as neurons the matrix itself is not
-//! needed: [`Moments`] adds up its products tile by tile.
+//! needed: [`NormalEquations`] adds up its products tile by tile.
 
 use ndarray::{Array1, Array2};
 
 use super::Solution;
 use super::diagnosis::{Diagnosis, Reason, Route};
-use super::frame::{Frame, Prepared};
+use super::equilibration::{Equilibration, Prepared};
 use super::lanczos::largest_eigenvalue;
-use super::moments::{Moments, RowSource};
+use super::normal_equations::{NormalEquations, RowSource};
 use super::norms::norm;
 use super::symmetric::Symmetric;
 use crate::error::Result;
-use crate::linalg::Positive;
+use crate::linalg::CholeskySolve;
 use crate::scalar::Scalar;
 
 /// The relative error that output weights may have by this route.
@@ -51,7 +51,7 @@ pub(super) fn solve_rows<A: Scalar>(
     if source.rows() < source.neurons() {
         return Ok(None);
     }
-    let moments = Moments::gather(source)?;
+    let moments = NormalEquations::gather(source)?;
     if !moments.in_range() {
         return Ok(None);
     }
@@ -71,7 +71,7 @@ pub(super) fn solve_rows<A: Scalar>(
     let Ok(solved) = A::solve_positive(shifted.view(), moments.right.view()) else {
         return Ok(None);
     };
-    let Positive { x, inverse_trace } = solved;
+    let CholeskySolve { x, inverse_trace } = solved;
     // |t - H b|^2 from the sums, where it is not a small difference of large numbers.
     let mut squares = Array1::zeros(x.ncols());
     for (output, square) in squares.iter_mut().enumerate() {
@@ -114,13 +114,15 @@ pub(super) fn solve<A: Scalar>(prepared: &Prepared<A>, lambda: f64) -> Option<So
     let mut diagonal = gram.diag_mut();
     diagonal += absolute;
     let (beta, residual, inverse_trace) = if dual {
-        let Positive { x, inverse_trace } = A::solve_positive(gram.view(), targets.view()).ok()?;
+        let CholeskySolve { x, inverse_trace } =
+            A::solve_positive(gram.view(), targets.view()).ok()?;
         let beta = A::product(hidden.t(), x.view());
         // T - (K + l - l) x.
         (beta, x * absolute, inverse_trace)
     } else {
         let right = A::product(hidden.t(), targets.view());
-        let Positive { x, inverse_trace } = A::solve_positive(gram.view(), right.view()).ok()?;
+        let CholeskySolve { x, inverse_trace } =
+            A::solve_positive(gram.view(), right.view()).ok()?;
         let residual = targets - &A::product(hidden.view(), x.view());
         (x, residual, inverse_trace)
     };
@@ -148,7 +150,7 @@ struct Found<A: Scalar> {
 
 impl<A: Scalar> Found<A> {
     /// In the problem's own units; `norms` are those of the residuals.
-    fn solution(self, frame: &Frame<A>, norms: impl Iterator<Item = f64>) -> Solution<A> {
+    fn solution(self, frame: &Equilibration<A>, norms: impl Iterator<Item = f64>) -> Solution<A> {
         let outputs = self.beta.ncols();
         let beta = frame.restore(self.beta);
         let intercept = frame.constant(&beta);

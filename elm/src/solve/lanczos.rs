@@ -142,7 +142,7 @@ impl Tridiagonal {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linalg::Kernel;
+    use crate::linalg::Backend;
     use ndarray::{Array2, ShapeBuilder};
     use ndarray_rand::RandomExt;
     use ndarray_rand::rand_distr::StandardNormal;

@@ -4,10 +4,10 @@
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
 
 use super::Route;
-use super::spectrum::{RowSpectrum, Spectrum};
+use super::design_svd::{DesignSvd, DesignSvdWithRows};
 use super::tiles::Tiles;
 use crate::error::Result;
-use crate::linalg::{Kernel, Triangular};
+use crate::linalg::{Backend, QrFactor};
 use crate::scalar::Scalar;
 
 /// The share of a score that rounding errors must have for them to be looked at closely.
@@ -21,9 +21,9 @@ const SCORED_ROWS: usize = 256;
 /// Rows pass by once, a block of them for all candidates: products of matrices, where a candidate
 /// by itself would read all rows for a product with a vector.
 struct Scores<'p, A: Scalar> {
-    spectrum: &'p Spectrum<A>,
+    spectrum: &'p DesignSvd<A>,
     /// What each candidate holds back of each direction, shape (directions, candidates).
-    held_back: Array2<A>,
+    complements: Array2<A>,
     /// Shape (candidates, outputs), in units of the scaled targets.
     sums: Array2<f64>,
     /// Whether only what leave-one-out adds to squared residuals is counted.
@@ -31,27 +31,27 @@ struct Scores<'p, A: Scalar> {
 }
 
 impl<'p, A: Scalar> Scores<'p, A> {
-    fn new(spectrum: &'p Spectrum<A>, candidates: &[f64], excess: bool) -> Self {
-        let mut held_back = Array2::zeros((spectrum.s.len(), candidates.len()));
-        for (mut column, &lambda) in held_back.columns_mut().into_iter().zip(candidates) {
-            column.assign(&spectrum.ridge_held_back(A::from_f64(lambda)));
+    fn new(spectrum: &'p DesignSvd<A>, candidates: &[f64], excess: bool) -> Self {
+        let mut complements = Array2::zeros((spectrum.s.len(), candidates.len()));
+        for (mut column, &lambda) in complements.columns_mut().into_iter().zip(candidates) {
+            column.assign(&spectrum.filter_complements(A::from_f64(lambda)));
         }
         Self {
             spectrum,
-            held_back,
+            complements,
             sums: Array2::zeros((candidates.len(), spectrum.c.ncols())),
             excess,
         }
     }
 
-    /// Adds rows, given what [`RowSpectrum`] knows of them.
+    /// Adds rows, given what [`DesignSvdWithRows`] knows of them.
     fn add(&mut self, u: ArrayView2<'_, A>, residual: ArrayView2<'_, A>, free: ArrayView1<'_, A>) {
         let squared = u.mapv(|u| u * u);
-        let mut denominators = A::product(squared.view(), self.held_back.view());
+        let mut denominators = A::product(squared.view(), self.complements.view());
         denominators += &free.insert_axis(Axis(1));
         let c = self.spectrum.c.view();
         for (output, mut score) in self.sums.columns_mut().into_iter().enumerate() {
-            let held = &self.held_back * &c.slice(s![.., output..=output]);
+            let held = &self.complements * &c.slice(s![.., output..=output]);
             let mut residuals = A::product(u, held.view());
             residuals += &residual.slice(s![.., output..=output]);
             if self.excess {
@@ -74,7 +74,7 @@ impl<'p, A: Scalar> Scores<'p, A> {
     fn finish(self, candidates: &[f64], roundoff: f64) -> Array2<f64> {
         let mut sums = self.sums;
         for (mut score, &lambda) in sums.rows_mut().into_iter().zip(candidates) {
-            let kept = self.spectrum.ridge_kept(A::from_f64(lambda));
+            let kept = self.spectrum.filter_factors(A::from_f64(lambda));
             let negligible = |o: usize| NEGLIGIBLE * score[o];
             let rounding = self.spectrum.rounding_squares(&kept, roundoff, negligible);
             for (score, rounding) in score.iter_mut().zip(rounding) {
@@ -88,7 +88,7 @@ impl<'p, A: Scalar> Scores<'p, A> {
 /// The sum of squared leave-one-out residuals, and of what rounding is to add to them, for each
 /// candidate and output, shape (candidates, outputs), in units of the scaled targets.
 pub(super) fn scores<A: Scalar>(
-    rows: &RowSpectrum<A>,
+    rows: &DesignSvdWithRows<A>,
     candidates: &[f64],
     roundoff: f64,
 ) -> Array2<f64> {
@@ -114,7 +114,7 @@ pub(super) fn scores<A: Scalar>(
 /// Those of making the rows and of the factorisations.
 pub(super) fn scores_of_tiles<A: Scalar>(
     tiles: &mut Tiles<'_, '_, A>,
-    spectrum: &Spectrum<f64>,
+    spectrum: &DesignSvd<f64>,
     candidates: &[f64],
     roundoff: f64,
 ) -> Result<Array2<f64>> {
@@ -160,12 +160,12 @@ pub(super) fn scores_of_tiles<A: Scalar>(
 
 /// The squared residuals of each candidate and output, which the spectrum knows: the least that scores
 /// can be. Shape (candidates, outputs).
-pub(super) fn squared_residuals(spectrum: &Spectrum<f64>, candidates: &[f64]) -> Array2<f64> {
+pub(super) fn squared_residuals(spectrum: &DesignSvd<f64>, candidates: &[f64]) -> Array2<f64> {
     let mut sums = Array2::zeros((candidates.len(), spectrum.c.ncols()));
     for (mut row, &lambda) in sums.rows_mut().into_iter().zip(candidates) {
-        let held = spectrum.ridge_held_back(lambda);
+        let held = spectrum.filter_complements(lambda);
         let left = (&spectrum.c * &held.insert_axis(Axis(1))).mapv_into(|c| c * c);
-        row.assign(&(left.sum_axis(Axis(0)) + &spectrum.unreached));
+        row.assign(&(left.sum_axis(Axis(0)) + &spectrum.residual_ss));
     }
     sums
 }
@@ -229,11 +229,11 @@ struct Light {
 }
 
 impl Light {
-    fn new(spectrum: &Spectrum<f64>, candidates: &[f64]) -> Self {
+    fn new(spectrum: &DesignSvd<f64>, candidates: &[f64]) -> Self {
         let narrow = |values: &Array2<f64>| values.mapv(f32::from_f64);
         let mut kept = Array2::zeros((spectrum.s.len(), candidates.len()));
         for (mut column, &lambda) in kept.columns_mut().into_iter().zip(candidates) {
-            column.assign(&spectrum.ridge_kept(lambda));
+            column.assign(&spectrum.filter_factors(lambda));
         }
         let gain = &kept / &spectrum.s.view().insert_axis(Axis(1));
         let beta = |c: ArrayView1<'_, f64>| {
@@ -295,7 +295,7 @@ impl Light {
 }
 
 /// Of hidden values and targets, in units of their scale.
-fn means(spectrum: &Spectrum<f64>) -> Vec<f64> {
+fn means(spectrum: &DesignSvd<f64>) -> Vec<f64> {
     let frame = &spectrum.frame;
     let hidden = &frame.hidden_mean / frame.hidden_scale;
     let targets = &frame.target_mean / &frame.target_scale;
@@ -308,7 +308,7 @@ fn means(spectrum: &Spectrum<f64>) -> Vec<f64> {
 /// not `close` their triangle stands, of which the row of the ones is what an intercept makes of them.
 fn scores_of_close_rows<A: Scalar>(
     tiles: &mut Tiles<'_, '_, A>,
-    spectrum: &Spectrum<f64>,
+    spectrum: &DesignSvd<f64>,
     mean: &[f64],
     close: &[usize],
     candidates: &[f64],
@@ -317,7 +317,7 @@ fn scores_of_close_rows<A: Scalar>(
     let neurons = tiles.neurons();
     let outputs = tiles.outputs();
     let intercept = spectrum.frame.intercept;
-    let Triangular { r, qtb, .. } = tiles.triangle_without(close, mean)?;
+    let QrFactor { r, qtb, .. } = tiles.triangle_without(close, mean)?;
     let extra = usize::from(intercept);
     let (ones, others) = r.view().split_at(Axis(1), extra);
     let mut own = Array2::zeros((close.len(), neurons + outputs + extra));
@@ -343,7 +343,7 @@ fn scores_of_close_rows<A: Scalar>(
             &ones / spectrum.frame.total_weight.sqrt()
         });
     let none = Array1::zeros(hidden.nrows());
-    let rows = RowSpectrum::of_rows(hidden, targets, constant, none, spectrum.frame.clone())?;
+    let rows = DesignSvdWithRows::of_rows(hidden, targets, constant, none, spectrum.frame.clone())?;
     let mut scores = Scores::new(&rows.spectrum, candidates, excess);
     let from = rows.u.nrows() - close.len();
     scores.add(

@@ -23,18 +23,18 @@
 //! # Ok::<(), elm::Error>(())
 //! ```
 
+pub(crate) mod design_svd;
 mod diagnosis;
-pub(crate) mod frame;
+pub(crate) mod equilibration;
 mod gram;
 mod inverse;
 pub(crate) mod lanczos;
 mod leave_one_out;
-pub(crate) mod moments;
 mod named;
+pub(crate) mod normal_equations;
 pub(crate) mod norms;
 mod pseudo_inverse;
 pub(crate) mod ridge;
-pub(crate) mod spectrum;
 pub(crate) mod symmetric;
 #[cfg(test)]
 mod tests_tiles;
@@ -50,8 +50,8 @@ use crate::check::{check_length, check_matrix, check_some_weight, present};
 use crate::error::{Error, Result};
 use crate::linalg::Failure;
 use crate::scalar::Scalar;
-use moments::{HiddenRows, RowSource};
-use spectrum::Spectrum;
+use design_svd::DesignSvd;
+use normal_equations::{HiddenRows, RowSource};
 
 pub use diagnosis::{Diagnosis, Reason, Route};
 pub use inverse::Inverse;
@@ -260,7 +260,7 @@ impl Solver {
     }
 
     /// Solves a problem that is known only by its spectrum.
-    pub(crate) fn solve_spectrum<A: Scalar>(&self, spectrum: &Spectrum<A>) -> Result<Solution<A>> {
+    pub(crate) fn solve_spectrum<A: Scalar>(&self, spectrum: &DesignSvd<A>) -> Result<Solution<A>> {
         self.check()?;
         in_range(match self {
             Self::Inverse(_) => {

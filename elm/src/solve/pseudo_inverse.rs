@@ -3,16 +3,16 @@
 use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
 
-use super::frame::{Frame, Prepared};
+use super::design_svd::DesignSvd;
+use super::equilibration::{Equilibration, Prepared};
 use super::lanczos::largest_eigenvalue;
-use super::moments::RowSource;
+use super::normal_equations::RowSource;
 use super::norms::{norm, rounding};
-use super::spectrum::Spectrum;
 use super::symmetric::Symmetric;
 use super::tiles::{self, Tiles};
 use super::{Diagnosis, LeastSquares, Reason, Route, Solution};
 use crate::error::{Error, Result};
-use crate::linalg::Triangular;
+use crate::linalg::QrFactor;
 use crate::scalar::Scalar;
 
 /// The least-squares solution of minimum norm.
@@ -79,16 +79,16 @@ impl PseudoInverse {
         let prepared = Prepared::new(problem);
         let (hidden, targets) = (prepared.hidden.view(), prepared.targets.view());
         if hidden.nrows() < hidden.ncols() {
-            return Ok(self.solve_spectrum(&Spectrum::from_prepared(prepared)?));
+            return Ok(self.solve_spectrum(&DesignSvd::from_prepared(prepared)?));
         }
         let triangle = A::triangularise(hidden, targets)?;
         if let Some(solution) = self.solve_triangle(&triangle, &prepared.frame) {
             return Ok(solution);
         }
-        let spectrum = if Spectrum::<A>::goes_by_triangle(hidden) {
-            Spectrum::of_triangle(triangle, prepared.frame)
+        let spectrum = if DesignSvd::<A>::goes_by_triangle(hidden) {
+            DesignSvd::of_triangle(triangle, prepared.frame)
         } else {
-            Spectrum::from_prepared(prepared)
+            DesignSvd::from_prepared(prepared)
         };
         Ok(self.solve_spectrum(&spectrum?))
     }
@@ -115,16 +115,16 @@ impl PseudoInverse {
     /// The answer for a problem of many more rows than neurons that is reduced to its triangle.
     pub(super) fn solve_centred<A: Scalar>(
         self,
-        triangle: Triangular<A>,
-        frame: Frame<A>,
+        triangle: QrFactor<A>,
+        frame: Equilibration<A>,
     ) -> Result<Solution<A>> {
         if let Some(solution) = self.solve_triangle(&triangle, &frame) {
             return Ok(solution);
         }
-        Ok(self.solve_spectrum(&Spectrum::of_triangle(triangle, frame)?))
+        Ok(self.solve_spectrum(&DesignSvd::of_triangle(triangle, frame)?))
     }
 
-    pub(super) fn solve_spectrum<A: Scalar>(self, spectrum: &Spectrum<A>) -> Solution<A> {
+    pub(super) fn solve_spectrum<A: Scalar>(self, spectrum: &DesignSvd<A>) -> Solution<A> {
         let cutoff = self.effective_cutoff(spectrum.level());
         let rank = spectrum.rank(cutoff);
         let gain = Array2::from_shape_fn((spectrum.s.len(), 1), |(j, _)| {
@@ -146,8 +146,8 @@ impl PseudoInverse {
     /// The plain least-squares solution, where every direction is well above the cut-off.
     fn solve_triangle<A: Scalar>(
         self,
-        triangle: &Triangular<A>,
-        frame: &Frame<A>,
+        triangle: &QrFactor<A>,
+        frame: &Equilibration<A>,
     ) -> Option<Solution<A>> {
         // In a direction that is not there QR can leave several times the level of rounding, which
         // is what singular values of the matrix itself are off by.
@@ -186,7 +186,7 @@ impl PseudoInverse {
             smallest_singular_value: Some(frame.outer_singular_value(smallest)),
             lambda: vec![0.0; outputs],
             degrees_of_freedom: vec![freedom; outputs],
-            residual_norm: frame.outer_residual_norms(triangle.unreached.iter().map(residual)),
+            residual_norm: frame.outer_residual_norms(triangle.residual_ss.iter().map(residual)),
             beta_norm: beta.columns().into_iter().map(norm).collect(),
             leave_one_out: None,
         };

@@ -4,10 +4,10 @@
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
 use serde::{Deserialize, Serialize};
 
-use super::frame::Prepared;
+use super::design_svd::{DesignSvd, DesignSvdWithRows};
+use super::equilibration::Prepared;
 use super::leave_one_out::{self, NEGLIGIBLE};
-use super::moments::RowSource;
-use super::spectrum::{RowSpectrum, Spectrum};
+use super::normal_equations::RowSource;
 use super::tiles::{self, Tiles};
 use super::{LeastSquares, Reason, Solution, gram};
 use crate::error::{Error, Result};
@@ -149,7 +149,7 @@ impl Ridge {
                 {
                     return Ok(solution);
                 }
-                Ok(self.solve_spectrum(&Spectrum::from_prepared(prepared)?))
+                Ok(self.solve_spectrum(&DesignSvd::from_prepared(prepared)?))
             }
             Lambda::Gcv | Lambda::LeaveOneOut => {
                 let hidden = A::widen(problem.hidden);
@@ -190,7 +190,7 @@ impl Ridge {
                 let Some((triangle, frame)) = tiles.centred_triangle()? else {
                     return Ok(None);
                 };
-                let spectrum = Spectrum::<A>::of_triangle(triangle.narrow(), frame.narrow())?;
+                let spectrum = DesignSvd::<A>::of_triangle(triangle.narrow(), frame.narrow())?;
                 Ok(Some(self.solve_spectrum(&spectrum)))
             }
             Lambda::Gcv | Lambda::LeaveOneOut => {
@@ -228,11 +228,11 @@ impl Ridge {
     ) -> Result<Solution<f64>> {
         let reason = Reason::StrengthSearch;
         if self.lambda == Lambda::Gcv {
-            let spectrum = Spectrum::new(problem)?;
+            let spectrum = DesignSvd::new(problem)?;
             let lambda = self.by_gcv(&spectrum, roundoff);
             return Ok(answer(&spectrum, reason, &lambda, None));
         }
-        let rows = RowSpectrum::new(problem)?;
+        let rows = DesignSvdWithRows::new(problem)?;
         let (lambda, errors) = self.by_leave_one_out(&rows, roundoff);
         // Without its only row a problem has nothing to place an intercept by.
         let errors = rows.spectrum.can_lose_a_row().then_some(errors);
@@ -245,7 +245,7 @@ impl Ridge {
     fn worthwhile_scores<A: Scalar>(
         self,
         tiles: &mut Tiles<'_, '_, A>,
-        spectrum: &Spectrum<f64>,
+        spectrum: &DesignSvd<f64>,
         candidates: &[f64],
         roundoff: f64,
     ) -> Result<Array2<f64>> {
@@ -276,7 +276,7 @@ impl Ridge {
 
     /// Solves without the rows, from which leave-one-out would choose: by generalised
     /// cross-validation then.
-    pub(super) fn solve_spectrum<A: Scalar>(self, spectrum: &Spectrum<A>) -> Solution<A> {
+    pub(super) fn solve_spectrum<A: Scalar>(self, spectrum: &DesignSvd<A>) -> Solution<A> {
         let reason = match self.lambda {
             Lambda::Relative(_) => Reason::WeakRidge,
             Lambda::Gcv | Lambda::LeaveOneOut => Reason::StrengthSearch,
@@ -296,7 +296,7 @@ impl Ridge {
     }
 
     /// The strength for each output, from a factorisation that is there already.
-    pub(crate) fn strengths<A: Scalar>(self, rows: &RowSpectrum<A>) -> Vec<f64> {
+    pub(crate) fn strengths<A: Scalar>(self, rows: &DesignSvdWithRows<A>) -> Vec<f64> {
         match self.lambda {
             Lambda::Relative(lambda) => vec![lambda; rows.spectrum.c.ncols()],
             Lambda::Gcv => self.by_gcv(&rows.spectrum, unit_roundoff::<A>()),
@@ -305,14 +305,14 @@ impl Ridge {
     }
 
     /// The same without the rows: by generalised cross-validation where leave-one-out was to choose.
-    pub(crate) fn strengths_without_rows<A: Scalar>(self, spectrum: &Spectrum<A>) -> Vec<f64> {
+    pub(crate) fn strengths_without_rows<A: Scalar>(self, spectrum: &DesignSvd<A>) -> Vec<f64> {
         match self.lambda {
             Lambda::Relative(lambda) => vec![lambda; spectrum.c.ncols()],
             Lambda::Gcv | Lambda::LeaveOneOut => self.by_gcv(spectrum, unit_roundoff::<A>()),
         }
     }
 
-    fn by_gcv<A: Scalar>(self, spectrum: &Spectrum<A>, roundoff: f64) -> Vec<f64> {
+    fn by_gcv<A: Scalar>(self, spectrum: &DesignSvd<A>, roundoff: f64) -> Vec<f64> {
         let candidates = distinct(spectrum);
         let scores = gcv_scores(spectrum, &candidates, roundoff);
         let chosen = self.choose(spectrum, &scores);
@@ -322,7 +322,7 @@ impl Ridge {
     /// Strengths and leave-one-out errors.
     fn by_leave_one_out<A: Scalar>(
         self,
-        rows: &RowSpectrum<A>,
+        rows: &DesignSvdWithRows<A>,
         roundoff: f64,
     ) -> (Vec<f64>, Vec<f64>) {
         let candidates = distinct(&rows.spectrum);
@@ -333,7 +333,7 @@ impl Ridge {
     /// The best candidate of each output, and the root of its mean score.
     fn strengths_and_errors<A: Scalar>(
         self,
-        spectrum: &Spectrum<A>,
+        spectrum: &DesignSvd<A>,
         candidates: &[f64],
         scores: &Array2<f64>,
     ) -> (Vec<f64>, Vec<f64>) {
@@ -362,7 +362,7 @@ impl Ridge {
 
     /// For each output the index of the strongest candidate that is as good as the best, to within
     /// [`TOLERANCE`], so that a flat score never means an unregularised fit.
-    fn choose<A: Scalar>(self, spectrum: &Spectrum<A>, scores: &Array2<f64>) -> Vec<usize> {
+    fn choose<A: Scalar>(self, spectrum: &DesignSvd<A>, scores: &Array2<f64>) -> Vec<usize> {
         let outputs = scores.ncols();
         if !self.shared {
             let strongest = |scores| Self::last_within(scores, TOLERANCE);
@@ -396,7 +396,7 @@ fn strength(step: i32) -> f64 {
 }
 
 /// The candidates that make a difference to this problem, rising.
-fn distinct<A: Scalar>(spectrum: &Spectrum<A>) -> Vec<f64> {
+fn distinct<A: Scalar>(spectrum: &DesignSvd<A>) -> Vec<f64> {
     let smallest = match (spectrum.s.first(), spectrum.s.last()) {
         (Some(&first), Some(&last)) => (last / first).as_f64().powi(2),
         _ => 1.0,
@@ -420,7 +420,7 @@ fn unit_roundoff<A: Scalar>() -> f64 {
 
 /// The solution at these relative strengths, one per output.
 pub(crate) fn answer<A: Scalar>(
-    spectrum: &Spectrum<A>,
+    spectrum: &DesignSvd<A>,
     reason: Reason,
     lambda: &[f64],
     leave_one_out: Option<Vec<f64>>,
@@ -438,20 +438,24 @@ pub(crate) fn answer<A: Scalar>(
 
 /// $n \cdot \text{RSS} / (n - \text{df})^2$ for each candidate and output, shape (candidates,
 /// outputs), in units of the scaled targets. RSS has in it what rounding is to add to it.
-fn gcv_scores<A: Scalar>(spectrum: &Spectrum<A>, candidates: &[f64], roundoff: f64) -> Array2<f64> {
+fn gcv_scores<A: Scalar>(
+    spectrum: &DesignSvd<A>,
+    candidates: &[f64],
+    roundoff: f64,
+) -> Array2<f64> {
     let mut scores = Array2::zeros((candidates.len(), spectrum.c.ncols()));
     for (mut row, &lambda) in scores.rows_mut().into_iter().zip(candidates) {
-        let held_back = spectrum.ridge_held_back(A::from_f64(lambda));
-        let spare = spectrum.spare_rows() as f64 + held_back.sum().as_f64();
+        let complements = spectrum.filter_complements(A::from_f64(lambda));
+        let spare = spectrum.spare_rows() as f64 + complements.sum().as_f64();
         for (output, score) in row.iter_mut().enumerate() {
             let rest = Zip::from(spectrum.c.column(output))
-                .and(&held_back)
-                .fold(spectrum.unreached[output], |sum, &c, &h| {
+                .and(&complements)
+                .fold(spectrum.residual_ss[output], |sum, &c, &h| {
                     sum + (c * h).powi(2)
                 });
             *score = rest.as_f64();
         }
-        let kept = spectrum.ridge_kept(A::from_f64(lambda));
+        let kept = spectrum.filter_factors(A::from_f64(lambda));
         let rounding = spectrum.rounding_squares(&kept, roundoff, |o| NEGLIGIBLE * row[o]);
         for (score, rounding) in row.iter_mut().zip(rounding) {
             *score = (*score + rounding) / (spare * spare);
@@ -460,7 +464,7 @@ fn gcv_scores<A: Scalar>(spectrum: &Spectrum<A>, candidates: &[f64], roundoff: f
     scores
 }
 
-impl<A: Scalar> RowSpectrum<A> {
+impl<A: Scalar> DesignSvdWithRows<A> {
     /// The (weighted) leave-one-out residuals $e_i / (1 - h_i)$ when each direction is held back
     /// by this share, shape (rows, outputs), given the $1 - h_i$ and the outputs' coordinates and
     /// residuals.
@@ -471,11 +475,11 @@ impl<A: Scalar> RowSpectrum<A> {
     pub(crate) fn leave_one_out(
         &self,
         denominators: &Array1<A>,
-        held_back: &Array1<A>,
+        complements: &Array1<A>,
         c: ArrayView2<'_, A>,
         residual: ArrayView2<'_, A>,
     ) -> Array2<A> {
-        let held = &c * &held_back.view().insert_axis(Axis(1));
+        let held = &c * &complements.view().insert_axis(Axis(1));
         let mut residuals = A::product(self.u.view(), held.view());
         residuals += &residual;
         residuals /= &denominators.view().insert_axis(Axis(1));

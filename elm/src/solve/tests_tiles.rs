@@ -10,7 +10,7 @@ use ndarray_rand::rand_distr::StandardNormal;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::moments::{HiddenRows, RowSource};
+use super::normal_equations::{HiddenRows, RowSource};
 use super::tiles::Tiles;
 use super::{LeastSquares, PseudoInverse, Ridge, Route, Solution};
 use crate::scalar::Scalar;

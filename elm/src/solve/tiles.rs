@@ -9,12 +9,12 @@ use std::ops::Range;
 use ndarray::{Array1, Array2, ArrayView2, Axis, ShapeBuilder, s};
 
 use super::Route;
-use super::frame::{Frame, magnitudes};
+use super::design_svd::DesignSvd;
+use super::equilibration::{Equilibration, magnitudes};
 use super::gram;
-use super::moments::{Moments, RowSource, centre_of, spread_runs};
-use super::spectrum::Spectrum;
+use super::normal_equations::{NormalEquations, RowSource, centre_of, spread_runs};
 use crate::error::Result;
-use crate::linalg::{Kernel, Svd, Triangular};
+use crate::linalg::{Backend, QrFactor, Svd};
 use crate::scalar::{Scalar, power_of_two};
 
 /// Rows for each column below which a problem is answered from its matrix, which costs no second
@@ -46,7 +46,7 @@ const TILE_BYTES: usize = 1 << 20;
 pub(super) struct Tiles<'s, 'a, A: Scalar> {
     source: &'s mut RowSource<'a, A>,
     /// Without means until they are known.
-    pub(super) frame: Frame<f64>,
+    pub(super) frame: Equilibration<f64>,
     /// Of hidden values and targets, in units of their scale: near the means, for a column that is
     /// constant its value. 0 without an intercept.
     shift: Vec<f64>,
@@ -62,7 +62,8 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     pub(super) fn new(source: &'s mut RowSource<'a, A>) -> Result<Option<Self>> {
         let weights = source.weights.map(A::widen);
         let weights = weights.as_ref().map(|weights| weights.view());
-        let mut frame = Frame::of_weights(source.rows(), weights.as_ref(), source.intercept);
+        let mut frame =
+            Equilibration::of_weights(source.rows(), weights.as_ref(), source.intercept);
         if !has_many_rows(frame.weighted_rows, source.neurons()) {
             return Ok(None);
         }
@@ -193,7 +194,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         }
         let hidden = sample.slice(s![.., ..neurons]);
         let nothing = Array2::zeros((sample.nrows(), 0));
-        let Triangular { r, .. } = f64::triangularise(hidden, nothing.view())?;
+        let QrFactor { r, .. } = f64::triangularise(hidden, nothing.view())?;
         // Pivots bound the smallest singular value from above, columns the largest from below.
         let smallest = r.diag().fold(f64::INFINITY, |m: f64, v| m.min(v.abs()));
         let largest = squares(r.view()).fold(0.0, |m: f64, v| m.max(*v)).sqrt();
@@ -205,7 +206,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     ///
     /// # Errors
     /// Those of making the rows and of the factorisations.
-    pub(super) fn spectrum(&mut self) -> Result<Option<Spectrum<f64>>> {
+    pub(super) fn spectrum(&mut self) -> Result<Option<DesignSvd<f64>>> {
         if self.look()?
             && let Some(spectrum) = self.spectrum_of_products()?
         {
@@ -214,7 +215,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         let Some((triangle, frame)) = self.triangle()? else {
             return Ok(None);
         };
-        Spectrum::of_triangle(triangle, frame).map(Some)
+        DesignSvd::of_triangle(triangle, frame).map(Some)
     }
 
     /// The triangle of the problem, and the frame with its means; or nothing where the numbers are
@@ -222,14 +223,16 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     ///
     /// # Errors
     /// Those of making the rows and of the factorisation.
-    pub(super) fn centred_triangle(&mut self) -> Result<Option<(Triangular<f64>, Frame<f64>)>> {
+    pub(super) fn centred_triangle(
+        &mut self,
+    ) -> Result<Option<(QrFactor<f64>, Equilibration<f64>)>> {
         self.look()?;
         self.triangle()
     }
 
     /// By the singular values of the sums of products, where those are well enough conditioned and
     /// the targets not explained down to where sums of squares have no digits.
-    fn spectrum_of_products(&mut self) -> Result<Option<Spectrum<f64>>> {
+    fn spectrum_of_products(&mut self) -> Result<Option<DesignSvd<f64>>> {
         /// The least share of the targets' squares that must be left.
         const UNEXPLAINED: f64 = 1e-6;
         let width = self.source.width();
@@ -241,7 +244,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
                 f64::add_gram(self.tile(range, &shift)?, &mut sums, &mut scratch);
             }
         }
-        let moments = Moments::of_sums(&sums, self.frame.clone(), shift.clone());
+        let moments = NormalEquations::of_sums(&sums, self.frame.clone(), shift.clone());
         self.shift = shift;
         if !moments.in_range() {
             return Ok(None);
@@ -259,20 +262,20 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         }
         let s = s.mapv_into(f64::sqrt);
         let c = f64::product(vt.view(), moments.right.view()) / s.view().insert_axis(Axis(1));
-        let unreached = &moments.squares - &squares(c.view());
+        let residual_ss = &moments.squares - &squares(c.view());
         let explained = |(&left, &all): (&f64, &f64)| all > 0.0 && left < UNEXPLAINED * all;
-        if unreached.iter().zip(&moments.squares).any(explained) {
+        if residual_ss.iter().zip(&moments.squares).any(explained) {
             return Ok(None);
         }
         let frame = moments.frame;
         let mean = &frame.hidden_mean / frame.hidden_scale;
         let lengths = &gram.diag() + &mean.mapv_into(|m| m * m * frame.total_weight);
-        Ok(Some(Spectrum {
+        Ok(Some(DesignSvd {
             route: Route::GramSvd,
             s,
             vt,
             c,
-            unreached,
+            residual_ss,
             lengths,
             frame,
         }))
@@ -287,7 +290,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         &mut self,
         left_out: &[usize],
         shift: &[f64],
-    ) -> Result<Triangular<f64>> {
+    ) -> Result<QrFactor<f64>> {
         let roots = self.frame.root_weights.select(Axis(0), left_out);
         for &row in left_out {
             self.frame.root_weights[row] = 0.0;
@@ -300,7 +303,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     }
 
     /// The triangle of the centred rows, and their means.
-    fn triangle(&mut self) -> Result<Option<(Triangular<f64>, Frame<f64>)>> {
+    fn triangle(&mut self) -> Result<Option<(QrFactor<f64>, Equilibration<f64>)>> {
         let shift = std::mem::take(&mut self.shift);
         let all = self.stacked(&shift)?;
         let triangle = self.centred(all, &shift);
@@ -311,7 +314,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     /// The triangle of the rows, block after block (sequential TSQR: Demmel, Grigori, Hoemmen and
     /// Langou, Communication-optimal parallel and sequential QR, 2012). Eliminating the column of
     /// ones first centres the rest.
-    fn stacked(&mut self, shift: &[f64]) -> Result<Triangular<f64>> {
+    fn stacked(&mut self, shift: &[f64]) -> Result<QrFactor<f64>> {
         let (neurons, outputs) = (self.neurons(), self.outputs());
         let columns = usize::from(self.frame.intercept) + neurons;
         let mut stack = Stack::new(columns, outputs, BLOCK * columns);
@@ -330,13 +333,13 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     /// Without the column of ones, the means taken from its row.
     fn centred(
         &self,
-        all: Triangular<f64>,
+        all: QrFactor<f64>,
         shift: &[f64],
-    ) -> Option<(Triangular<f64>, Frame<f64>)> {
-        let Triangular {
+    ) -> Option<(QrFactor<f64>, Equilibration<f64>)> {
+        let QrFactor {
             mut r,
             mut qtb,
-            mut unreached,
+            mut residual_ss,
         } = all;
         let mut frame = self.frame.clone();
         if frame.intercept {
@@ -359,11 +362,11 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
                     column.fill(0.0);
                 }
             }
-            let left = squares(qtb.view()) + &unreached;
+            let left = squares(qtb.view()) + &residual_ss;
             for (output, mut column) in qtb.columns_mut().into_iter().enumerate() {
                 if constant(left[output], target_mean[output]) {
                     column.fill(0.0);
-                    unreached[output] = 0.0;
+                    residual_ss[output] = 0.0;
                 }
             }
             frame.hidden_mean = hidden_mean * frame.hidden_scale;
@@ -373,8 +376,13 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         let bound = f64::MAX.sqrt();
         let in_range = largest == 0.0 || (bound.recip()..bound).contains(&largest);
         let finite = |values: &Array2<f64>| values.iter().all(|value| value.is_finite());
-        let finite = finite(&r) && finite(&qtb) && unreached.iter().all(|value| value.is_finite());
-        let triangle = Triangular { r, qtb, unreached };
+        let finite =
+            finite(&r) && finite(&qtb) && residual_ss.iter().all(|value| value.is_finite());
+        let triangle = QrFactor {
+            r,
+            qtb,
+            residual_ss,
+        };
         (in_range && finite).then_some((triangle, frame))
     }
 }
@@ -383,7 +391,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
 struct Stack {
     hidden: Array2<f64>,
     targets: Array2<f64>,
-    unreached: Array1<f64>,
+    residual_ss: Array1<f64>,
     filled: usize,
 }
 
@@ -392,7 +400,7 @@ impl Stack {
         Self {
             hidden: Array2::zeros((columns + block, columns).f()),
             targets: Array2::zeros((columns + block, outputs).f()),
-            unreached: Array1::zeros(outputs),
+            residual_ss: Array1::zeros(outputs),
             filled: columns,
         }
     }
@@ -426,23 +434,26 @@ impl Stack {
 
     fn factorise(&mut self) -> Result<()> {
         let rows = s![..self.filled, ..];
-        let Triangular { r, qtb, unreached } =
-            f64::triangularise(self.hidden.slice(rows), self.targets.slice(rows))?;
+        let QrFactor {
+            r,
+            qtb,
+            residual_ss,
+        } = f64::triangularise(self.hidden.slice(rows), self.targets.slice(rows))?;
         self.filled = r.nrows();
         let top = s![..self.filled, ..];
         self.hidden.slice_mut(top).assign(&r);
         self.targets.slice_mut(top).assign(&qtb);
-        self.unreached += &unreached;
+        self.residual_ss += &residual_ss;
         Ok(())
     }
 
-    fn finish(mut self) -> Result<Triangular<f64>> {
+    fn finish(mut self) -> Result<QrFactor<f64>> {
         self.factorise()?;
         let top = s![..self.filled, ..];
-        Ok(Triangular {
+        Ok(QrFactor {
             r: self.hidden.slice(top).to_owned(),
             qtb: self.targets.slice(top).to_owned(),
-            unreached: self.unreached,
+            residual_ss: self.residual_ss,
         })
     }
 }
@@ -452,14 +463,14 @@ fn squares(matrix: ArrayView2<'_, f64>) -> Array1<f64> {
     matrix.map_axis(Axis(0), |column| column.dot(&column))
 }
 
-impl<A: Scalar> Triangular<A> {
+impl<A: Scalar> QrFactor<A> {
     /// In another type.
-    pub(super) fn narrow<B: Scalar>(self) -> Triangular<B> {
+    pub(super) fn narrow<B: Scalar>(self) -> QrFactor<B> {
         let value = |value: A| B::from_f64(value.as_f64());
-        Triangular {
+        QrFactor {
             r: self.r.mapv_into_any(value),
             qtb: self.qtb.mapv_into_any(value),
-            unreached: self.unreached.mapv_into_any(value),
+            residual_ss: self.residual_ss.mapv_into_any(value),
         }
     }
 }

@@ -1,21 +1,20 @@
 //! The search itself: trials, and where to go from them.
 
 use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
-use rand::SeedableRng;
 use rand::seq::index;
-use rand_chacha::ChaCha8Rng;
 
 use super::{Criterion, Trial, Tuner};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 use crate::solve::Ridge;
 use crate::stats::Moments;
+use crate::stream::Stream;
 use crate::validate::assign_folds;
 
 /// Neurons that the search uses as long as their number is not chosen.
-const MODERATE: usize = 100;
+const SEARCH_NEURONS: usize = 100;
 /// Relative gain below which more neurons, or another scale for an input, do not pay.
-const WORTHWHILE: f64 = 0.01;
+const MIN_GAIN: f64 = 0.01;
 /// Coarse steps of the scale: half a decade.
 const COARSE: f64 = 0.5;
 /// What a held-out error at a scale below the centre counts more for, for each decade.
@@ -40,9 +39,9 @@ struct Attempt {
 
 impl Attempt {
     /// Whether the errors are smaller by more than so many standard errors of the difference.
-    fn beats(&self, other: &Self, standard_errors: f64) -> bool {
+    fn improves_on(&self, other: &Self, standard_errors: f64) -> bool {
         let priced = |attempt: &Self| attempt.trial.score * attempt.price;
-        if priced(self) >= priced(other) * (1.0 - WORTHWHILE) {
+        if priced(self) >= priced(other) * (1.0 - MIN_GAIN) {
             return false;
         }
         let gains = || {
@@ -92,8 +91,7 @@ impl<'a, A: Scalar> Search<'a, A> {
         let most = tuner.most_neurons(x.nrows());
         let rows = tuner.search_rows.min(x.nrows());
         let (x, t) = if rows < x.nrows() {
-            let mut random = ChaCha8Rng::seed_from_u64(tuner.base.get_seed());
-            random.set_stream(3);
+            let mut random = Stream::SearchRows.of(tuner.base.get_seed());
             let mut chosen = index::sample(&mut random, x.nrows(), rows).into_vec();
             chosen.sort_unstable();
             (x.select(Axis(0), &chosen), t.select(Axis(0), &chosen))
@@ -136,7 +134,7 @@ impl<'a, A: Scalar> Search<'a, A> {
     pub(super) fn run(&mut self) -> Result<()> {
         let budget = self.tuner.budget;
         let most = self.most;
-        let neurons = self.tuner.neurons.unwrap_or(MODERATE.min(most));
+        let neurons = self.tuner.neurons.unwrap_or(SEARCH_NEURONS.min(most));
         if self.tuner.neurons.is_none() {
             self.limit = budget - FOR_NEURONS.min(budget / 4);
         }
@@ -204,14 +202,14 @@ impl<'a, A: Scalar> Search<'a, A> {
     /// input's is one more parameter fitted to the rows, and leave-one-out does not leave a row out of
     /// that fit. (Of single inputs tens are tried, and the best of so many that change nothing looks
     /// better by two standard errors, however many rows there are.)
-    fn caution(&self) -> f64 {
+    fn overfitting_penalty(&self) -> f64 {
         10.0 * self.x.ncols() as f64 / self.x.nrows() as f64
     }
 
     /// Scales inputs by the slopes that the network has along them, and again, as long as that pays.
     fn follow_slopes(&mut self) -> Result<()> {
         const ROUNDS: usize = 4;
-        let caution = self.caution();
+        let caution = self.overfitting_penalty();
         for _ in 0..ROUNDS {
             let Some(now) = self.now().filter(|_| !self.is_spent()) else {
                 break;
@@ -224,7 +222,7 @@ impl<'a, A: Scalar> Search<'a, A> {
                 let scales = proportional(&slopes, power);
                 let exponent = now.scale.log10();
                 moved |= self.move_if(now.neurons, exponent, &scales, |new, old| {
-                    new.beats(old, 1.0 + caution)
+                    new.improves_on(old, 1.0 + caution)
                 })?;
             }
             if !moved {
@@ -282,7 +280,7 @@ impl<'a, A: Scalar> Search<'a, A> {
 
     /// Coordinate by coordinate, the steepest first, by a factor that shrinks once no input moves.
     fn choose_input_scales(&mut self) -> Result<()> {
-        let caution = self.caution();
+        let caution = self.overfitting_penalty();
         // The budget may end before the inputs do.
         let mut order: Vec<usize> = (0..self.x.ncols()).collect();
         if let Some(slopes) = &self.steepness {
@@ -301,7 +299,7 @@ impl<'a, A: Scalar> Search<'a, A> {
                     scales[input] *= 10.0_f64.powf(direction * step);
                     let exponent = now.scale.log10();
                     if self.move_if(now.neurons, exponent, &scales, |new, old| {
-                        new.beats(old, 2.0 + caution)
+                        new.improves_on(old, 2.0 + caution)
                     })? {
                         moved = true;
                         break;
@@ -413,19 +411,19 @@ impl<'a, A: Scalar> Search<'a, A> {
 /// The search begins at the scale that suits most problems, and leaves it for a reason: small scales
 /// make networks that are nearly polynomials, whose errors at the edge of the data few rows show.
 fn scale_pays(new: &Attempt, old: &Attempt) -> bool {
-    new.beats(old, 1.5)
+    new.improves_on(old, 1.5)
 }
 
 fn neurons_pay(new: &Attempt, old: &Attempt) -> bool {
-    new.beats(old, 1.0)
+    new.improves_on(old, 1.0)
 }
 
 fn links_pay(new: &Attempt, old: &Attempt) -> bool {
-    new.beats(old, 0.5)
+    new.improves_on(old, 0.5)
 }
 
 fn step_pays(new: &Attempt, old: &Attempt) -> bool {
-    new.beats(old, 0.5)
+    new.improves_on(old, 0.5)
 }
 
 /// Scales in proportion to a power of the slopes, so that a weighted sum keeps its size.

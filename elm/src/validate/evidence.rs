@@ -7,7 +7,7 @@ use ndarray::Zip;
 use super::Validator;
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
-use crate::solve::spectrum::RowSpectrum;
+use crate::solve::design_svd::DesignSvdWithRows;
 
 impl<A: Scalar> Validator<A> {
     /// The logarithm of each output's evidence, also called marginal likelihood: the density of its
@@ -29,7 +29,7 @@ impl<A: Scalar> Validator<A> {
     /// [`Error::Shape`] when `lambda` has neither one entry nor one per output, [`Error::Parameter`]
     /// when one is not positive and finite, [`Error::Undetermined`] when no row is left to judge.
     pub fn log_evidence(&self, lambda: &[f64]) -> Result<Vec<f64>> {
-        let RowSpectrum {
+        let DesignSvdWithRows {
             spectrum, residual, ..
         } = &self.rows;
         let frame = &spectrum.frame;
@@ -51,13 +51,13 @@ impl<A: Scalar> Validator<A> {
                     expected: "finite and positive",
                 });
             }
-            let held_back = spectrum.ridge_held_back(strength).mapv(Scalar::as_f64);
-            let complexity: f64 = held_back.iter().map(|f| -f.ln()).sum();
+            let complements = spectrum.filter_complements(strength).mapv(Scalar::as_f64);
+            let complexity: f64 = complements.iter().map(|f| -f.ln()).sum();
             for output in outputs {
                 let (beyond, along) = (residual.column(output), spectrum.c.column(output));
                 let squares = beyond.iter().map(|r| r.as_f64().powi(2)).sum::<f64>()
                     + Zip::from(along)
-                        .and(&held_back)
+                        .and(&complements)
                         .fold(0.0, |sum, c, f| sum + c.as_f64().powi(2) * f);
                 let scale = frame.target_scale[output].as_f64();
                 let spread = (TAU * squares / rows).ln() + 2.0 * scale.ln();

@@ -129,7 +129,7 @@ impl<A: Scalar> Validator<A> {
         // Leaving rows out is fitting the targets less their held-out residuals.
         let mut c = spectrum.c.select(Axis(1), outputs);
         c -= &A::product(self.rows.u.select(Axis(0), rows).t(), inner.view());
-        c *= &spectrum.ridge_kept(strength).insert_axis(Axis(1));
+        c *= &spectrum.filter_factors(strength).insert_axis(Axis(1));
         let constant = self.rows.constant.select(Axis(0), rows).dot(inner)
             / -spectrum.frame.total_weight.sqrt();
         A::product(coordinates.view(), c.view()) + &constant

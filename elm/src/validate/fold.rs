@@ -7,7 +7,7 @@ use ndarray::{Array1, Array2, Axis, s};
 use super::Validator;
 use crate::check::check_length;
 use crate::error::{Error, Result};
-use crate::linalg::{Positive, Triangular};
+use crate::linalg::{CholeskySolve, QrFactor};
 use crate::scalar::Scalar;
 use crate::solve::norms::rounding;
 
@@ -147,11 +147,11 @@ impl<A: Scalar> Fold<A> {
         outputs: &[usize],
     ) -> Result<Array2<A>> {
         let spectrum = &validator.rows.spectrum;
-        let held_back = spectrum.ridge_held_back(strength);
+        let complements = spectrum.filter_complements(strength);
         let u = validator.rows.u.select(Axis(0), &self.rows);
         let c = spectrum.c.select(Axis(1), outputs);
         let residual = validator.rows.residual.select(Axis(1), outputs);
-        let u_held = &u * &held_back;
+        let u_held = &u * &complements;
         let matrix = gap + &A::product(u_held.view(), u.t());
         let right = residual.select(Axis(0), &self.rows) + A::product(u_held.view(), c.view());
         // With everything spanned the gap is exactly 0, and errors are relative to what is left.
@@ -179,7 +179,7 @@ impl<A: Scalar> Fold<A> {
                 }
             }
         }
-        let root = held_back.mapv(A::sqrt).insert_axis(Axis(1));
+        let root = complements.mapv(A::sqrt).insert_axis(Axis(1));
         let lower = &u.t() * &root;
         let matrix = stack(&units, &lower);
         let right = stack(&residual, &(&c * &root));
@@ -200,17 +200,17 @@ impl<A: Scalar> Fold<A> {
         let extra = usize::from(spectrum.frame.intercept);
         // The intercept is not held back.
         let mut kept_root = Array1::ones(gram.nrows());
-        let mut held_back = Array1::zeros(gram.nrows());
+        let mut complements = Array1::zeros(gram.nrows());
         kept_root
             .slice_mut(s![extra..])
-            .assign(&spectrum.ridge_kept(strength).mapv(A::sqrt));
-        held_back
+            .assign(&spectrum.filter_factors(strength).mapv(A::sqrt));
+        complements
             .slice_mut(s![extra..])
-            .assign(&spectrum.ridge_held_back(strength));
+            .assign(&spectrum.filter_complements(strength));
         let column = kept_root.view().insert_axis(Axis(1));
         let mut matrix = gram * &kept_root * column;
         let mut diagonal = matrix.diag_mut();
-        diagonal += &held_back;
+        diagonal += &complements;
         let right = product * &column;
         let solution = match solve_if_stable(&matrix, &right, A::one()) {
             Some(solution) => solution,
@@ -219,7 +219,7 @@ impl<A: Scalar> Fold<A> {
                     .filter(|row| self.rows.binary_search(row).is_err())
                     .collect();
                 let upper = validator.basis(&left) * &kept_root;
-                let matrix = stack(&upper, &Array2::from_diag(&held_back.mapv(A::sqrt)));
+                let matrix = stack(&upper, &Array2::from_diag(&complements.mapv(A::sqrt)));
                 let targets = validator.inner_targets.select(Axis(0), &left);
                 let targets = targets.select(Axis(1), outputs);
                 let right = stack(&targets, &Array2::zeros(product.dim()));
@@ -242,7 +242,7 @@ impl<A: Scalar> Fold<A> {
         matrix: &Array2<A>,
         right: &Array2<A>,
     ) -> Result<Array2<A>> {
-        let Triangular { r, qtb, .. } = A::triangularise(matrix.view(), right.view())?;
+        let QrFactor { r, qtb, .. } = A::triangularise(matrix.view(), right.view())?;
         let singular = A::singular_values(r.view())?;
         let level = rounding::<A>(matrix.nrows(), matrix.ncols()) * scale;
         let level = level.max(validator.singular_level(strength));
@@ -300,7 +300,7 @@ fn solve_if_stable<A: Scalar>(
     right: &Array2<A>,
     noise: A,
 ) -> Option<Array2<A>> {
-    let Positive { x, inverse_trace } = A::solve_positive(matrix.view(), right.view()).ok()?;
+    let CholeskySolve { x, inverse_trace } = A::solve_positive(matrix.view(), right.view()).ok()?;
     // Equations that are all alike are as stable as one of them.
     let amplification = inverse_trace * noise - A::from_f64(matrix.nrows() as f64);
     let limit = A::epsilon().sqrt().sqrt().recip();

@@ -14,11 +14,12 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use ndarray::{Array1, Array2, ArrayView2};
+use rand::Rng;
 use rand::seq::index;
-use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::geometry::{NORMAL, Pair, cartesian, dot};
+use crate::streams::{self, generator};
 
 /// Anchors laid over the hemisphere, and further ones for light and viewer near the horizon, where
 /// measurements end and a highlight's extrapolation grows fastest.
@@ -112,8 +113,7 @@ pub(super) struct Anchors {
 
 impl Anchors {
     pub(super) fn new(neighbourhood: &Neighbourhood, seed: u64) -> Self {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        random.set_stream(9);
+        let mut random = generator(seed, streams::ANCHORS);
         let pairs = scatter(&mut random);
         let near = pairs.iter().map(place);
         let near = near.map(|at| neighbourhood.nearest(at, LISTED, None));

@@ -4,9 +4,7 @@ use std::f64::consts::PI;
 
 use elm::{Activation, Biases, Distribution, ElmParams, Scaler};
 use ndarray::{Array1, Array2, ArrayView2, Axis, Slice};
-use rand::SeedableRng;
 use rand::seq::index;
-use rand_chacha::ChaCha8Rng;
 
 use super::errors::{dark_noise, row_weights};
 use super::finish::Finished;
@@ -19,6 +17,7 @@ use crate::geometry::Pair;
 use crate::link::{FittedLink, Link};
 use crate::model::BrdfModel;
 use crate::scales::spread;
+use crate::streams::{self, generator};
 
 /// Most neurons, unless they are asked for.
 const NEURONS: usize = 400;
@@ -118,8 +117,7 @@ impl<'a> Search<'a> {
         values: ArrayView2<'a, f64>,
         link: &FittedLink,
     ) -> Result<Self> {
-        let mut random = ChaCha8Rng::seed_from_u64(tuned.seed);
-        random.set_stream(7);
+        let mut random = generator(tuned.seed, streams::FEW);
         let count = pairs.len().min(SEARCH_ROWS);
         let rows = index::sample(&mut random, pairs.len(), count).into_vec();
         let sets = tuned.sets().into_iter().map(|features| {

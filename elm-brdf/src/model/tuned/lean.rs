@@ -4,9 +4,7 @@ use elm::prune::Keep;
 use elm::solve::Ridge;
 use elm::{Activation, Biases, CheckedParams, Distribution, ElmParams, Scaler};
 use ndarray::{Array2, ArrayView2, Axis};
-use rand::SeedableRng;
 use rand::seq::index;
-use rand_chacha::ChaCha8Rng;
 
 use super::errors::row_weights;
 use super::many::RIDGE;
@@ -18,6 +16,7 @@ use crate::geometry::Pair;
 use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
 use crate::model::{BrdfModel, Layer};
+use crate::streams::{self, generator};
 
 /// A network of so many neurons of one function, made for cheap [evaluation](crate::batch).
 ///
@@ -100,8 +99,7 @@ impl Lean {
         let targets = link.to_targets(values)?;
         let x = self.features.compute_training(pairs);
         let scaler = Scaler::measured(&x)?;
-        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        random.set_stream(6);
+        let mut random = generator(self.seed, streams::COMPACT);
         let wanted = pairs.len().min(2 * ROWS);
         let rows = index::sample(&mut random, pairs.len(), wanted).into_vec();
         // Of few rows most are needed for the fit. A single one is fitted and judges.

@@ -4,9 +4,7 @@ use elm::Scaler;
 use elm::prune::Keep;
 use elm::solve::Ridge;
 use ndarray::{Array2, ArrayView2, Axis};
-use rand::SeedableRng;
 use rand::seq::index;
-use rand_chacha::ChaCha8Rng;
 
 use super::errors::{cut_off_means, dark_noise, geometric_root};
 use super::finish::Finished;
@@ -18,6 +16,7 @@ use crate::geometry::Pair;
 use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
 use crate::model::BrdfModel;
+use crate::streams::{self, generator};
 
 /// Neurons unless said otherwise: some 675 numbers for three channels.
 pub(super) const NEURONS: usize = 213;
@@ -51,8 +50,7 @@ fn drawn(neurons: usize) -> usize {
 
 pub(super) fn fit(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<BrdfModel> {
     let mut link = Link::default_log().fit(values)?;
-    let mut random = ChaCha8Rng::seed_from_u64(tuned.seed);
-    random.set_stream(5);
+    let mut random = generator(tuned.seed, streams::MANY);
     let wanted = pairs.len().min(2 * SEARCH_ROWS);
     let rows = index::sample(&mut random, pairs.len(), wanted).into_vec();
     let mut settings = Search::new(tuned, &link, pairs, values, &rows)?.best()?;

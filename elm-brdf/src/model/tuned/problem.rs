@@ -1,9 +1,7 @@
 //! The measurements of a fit: targets, weights, folds, and what is guessed where nothing was measured.
 
 use ndarray::{Array1, Array2, ArrayView2, Axis};
-use rand::SeedableRng;
 use rand::seq::index;
-use rand_chacha::ChaCha8Rng;
 
 use super::Tuned;
 use super::anchors::{Anchors, Neighbourhood};
@@ -11,6 +9,7 @@ use super::errors::row_weights;
 use crate::error::Result;
 use crate::geometry::Pair;
 use crate::link::FittedLink;
+use crate::streams::{self, generator};
 
 /// Folds of the cross-validation.
 const FOLDS: usize = 5;
@@ -51,8 +50,7 @@ impl<'a> Problem<'a> {
         noise: Vec<f64>,
         noisy: bool,
     ) -> Result<Self> {
-        let mut random = ChaCha8Rng::seed_from_u64(tuned.seed);
-        random.set_stream(8);
+        let mut random = generator(tuned.seed, streams::JUDGED);
         let rows = pairs.len();
         let judged = index::sample(&mut random, rows, rows.min(JUDGED)).into_vec();
         let count = FOLDS.min(rows);

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, ShapeBuilder, s};
 
-use super::frame::{Frame, magnitudes, weighted_magnitudes};
+use super::equilibration::{Equilibration, magnitudes, weighted_magnitudes};
 use crate::error::Result;
 use crate::feature_map::FeatureRows;
 use crate::scalar::{Scalar, power_of_two};
@@ -127,7 +127,7 @@ impl<A: Scalar> RowSource<'_, A> {
     fn write(
         &mut self,
         rows: Range<usize>,
-        frame: &Frame<A>,
+        frame: &Equilibration<A>,
         shift: &[A],
         to: &mut [A],
     ) -> Result<()> {
@@ -164,7 +164,7 @@ impl<A: Scalar> RowSource<'_, A> {
 }
 
 /// A problem as its normal equations: rows weighted, columns centred where there is an intercept.
-pub(crate) struct Moments<A: Scalar> {
+pub(crate) struct NormalEquations<A: Scalar> {
     /// $\tilde H^T \tilde H$, the lower half, by columns.
     pub(crate) gram: Array2<A>,
     /// $\tilde H^T \tilde T$.
@@ -175,19 +175,19 @@ pub(crate) struct Moments<A: Scalar> {
     /// beside: $n \lVert \delta \rVert^2$ for $\delta$ the distance of the means from where the columns
     /// were shifted to.
     pub(crate) correction: A,
-    pub(crate) frame: Frame<A>,
+    pub(crate) frame: Equilibration<A>,
     /// What was taken off hidden and target columns, these in units of their scale.
     shift: Vec<A>,
 }
 
-impl<A: Scalar> Moments<A> {
+impl<A: Scalar> NormalEquations<A> {
     /// Adds up all rows.
     ///
     /// # Errors
     /// Those of making the rows.
     pub(crate) fn gather(source: &mut RowSource<'_, A>) -> Result<Self> {
         let (rows, neurons, outputs) = (source.rows(), source.neurons(), source.outputs());
-        let mut frame = Frame::of_weights(rows, source.weights.as_ref(), source.intercept);
+        let mut frame = Equilibration::of_weights(rows, source.weights.as_ref(), source.intercept);
         frame.target_scale =
             weighted_magnitudes(source.targets, &frame.root_weights).mapv_into(power_of_two);
         frame.hidden_scale = source.hidden.scale(&frame.root_weights);
@@ -230,7 +230,7 @@ impl<A: Scalar> Moments<A> {
         Ok(Self::of_sums(&sums, frame, shift))
     }
 
-    pub(super) fn of_sums(sums: &Array2<A>, mut frame: Frame<A>, shift: Vec<A>) -> Self {
+    pub(super) fn of_sums(sums: &Array2<A>, mut frame: Equilibration<A>, shift: Vec<A>) -> Self {
         let (neurons, outputs) = (frame.hidden_mean.len(), frame.target_mean.len());
         let mut gram = Array2::zeros((neurons, neurons).f());
         gram.assign(&sums.slice(s![..neurons, ..neurons]));
@@ -374,7 +374,7 @@ pub(super) fn centre_of<A: Scalar>(tile: &[A], width: usize, roots: &Array1<A>) 
 mod tests {
     use ndarray::{Array1, Array2};
 
-    use super::{HiddenRows, Moments, RowSource, spread_runs};
+    use super::{HiddenRows, NormalEquations, RowSource, spread_runs};
 
     #[test]
     fn runs_are_spread_over_all_rows_and_hold_as_many_as_wanted() {
@@ -400,7 +400,7 @@ mod tests {
             weights: Some(weights.view()),
             intercept: true,
         };
-        let moments = Moments::gather(&mut source).unwrap();
+        let moments = NormalEquations::gather(&mut source).unwrap();
         let largest = moments.gram.diag().fold(0.0, |m: f64, &d| m.max(d));
         assert!(moments.correction < 0.01 * largest);
     }

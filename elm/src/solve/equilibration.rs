@@ -8,7 +8,7 @@ use crate::stats;
 
 /// The scales and means that were taken out of a problem.
 #[derive(Debug, Clone)]
-pub(crate) struct Frame<A: Scalar> {
+pub(crate) struct Equilibration<A: Scalar> {
     pub(crate) rows: usize,
     /// Rows whose weight is not 0.
     pub(crate) weighted_rows: usize,
@@ -26,7 +26,7 @@ pub(crate) struct Frame<A: Scalar> {
     pub(crate) target_scale: Array1<A>,
 }
 
-impl<A: Scalar> Frame<A> {
+impl<A: Scalar> Equilibration<A> {
     /// What the weights alone say; of means and scales there are none yet.
     pub(crate) fn of_weights(
         rows: usize,
@@ -49,9 +49,9 @@ impl<A: Scalar> Frame<A> {
     }
 
     /// In another type.
-    pub(crate) fn narrow<B: Scalar>(self) -> Frame<B> {
+    pub(crate) fn narrow<B: Scalar>(self) -> Equilibration<B> {
         let value = |value: A| B::from_f64(value.as_f64());
-        Frame {
+        Equilibration {
             rows: self.rows,
             weighted_rows: self.weighted_rows,
             intercept: self.intercept,
@@ -122,13 +122,13 @@ impl<A: Scalar> Frame<A> {
 pub(crate) struct Prepared<A: Scalar> {
     pub(crate) hidden: Array2<A>,
     pub(crate) targets: Array2<A>,
-    pub(crate) frame: Frame<A>,
+    pub(crate) frame: Equilibration<A>,
 }
 
 impl<A: Scalar> Prepared<A> {
     pub(crate) fn new(problem: &LeastSquares<'_, A>) -> Self {
         let rows = problem.rows();
-        let frame = Frame::of_weights(rows, problem.weights.as_ref(), problem.intercept);
+        let frame = Equilibration::of_weights(rows, problem.weights.as_ref(), problem.intercept);
         let (_, weights) = unit_weights(rows, problem.weights.as_ref());
         let root_weights = &frame.root_weights;
 
@@ -173,7 +173,7 @@ impl<A: Scalar> Prepared<A> {
                 }
             }
         }
-        let frame = Frame {
+        let frame = Equilibration {
             hidden_mean,
             target_mean,
             hidden_scale,

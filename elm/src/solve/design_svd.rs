@@ -9,16 +9,16 @@
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
 
-use super::frame::{Frame, Prepared};
+use super::equilibration::{Equilibration, Prepared};
 use super::norms::{norm, rounding};
 use super::{Diagnosis, LeastSquares, Reason, Route, Solution};
 use crate::error::Result;
-use crate::linalg::{Svd, Triangular};
+use crate::linalg::{QrFactor, Svd};
 use crate::scalar::Scalar;
 
 /// See the module's documentation.
 #[derive(Debug, Clone)]
-pub(crate) struct Spectrum<A: Scalar> {
+pub(crate) struct DesignSvd<A: Scalar> {
     pub(crate) route: Route,
     /// The singular values above rounding error, falling; length $k$.
     pub(crate) s: Array1<A>,
@@ -27,16 +27,16 @@ pub(crate) struct Spectrum<A: Scalar> {
     /// $U^T \tilde T$, shape ($k$, outputs).
     pub(crate) c: Array2<A>,
     /// For each output the sum of squares of $\tilde T$ that no singular vector reaches.
-    pub(crate) unreached: Array1<A>,
+    pub(crate) residual_ss: Array1<A>,
     /// The sum of squares of each column as predictions see it: scaled but not centred.
     pub(crate) lengths: Array1<A>,
-    pub(crate) frame: Frame<A>,
+    pub(crate) frame: Equilibration<A>,
 }
 
-/// A [`Spectrum`] that also knows the rows, as leave-one-out needs them.
+/// A [`DesignSvd`] that also knows the rows, as leave-one-out needs them.
 #[derive(Debug, Clone)]
-pub(crate) struct RowSpectrum<A: Scalar> {
-    pub(crate) spectrum: Spectrum<A>,
+pub(crate) struct DesignSvdWithRows<A: Scalar> {
+    pub(crate) spectrum: DesignSvd<A>,
     /// Shape (rows, $k$).
     pub(crate) u: Array2<A>,
     /// $\tilde T - U C$: the residual where nothing is held back, shape (rows, outputs).
@@ -49,7 +49,7 @@ pub(crate) struct RowSpectrum<A: Scalar> {
     pub(crate) constant: Array1<A>,
 }
 
-impl<A: Scalar> Spectrum<A> {
+impl<A: Scalar> DesignSvd<A> {
     /// Factorises without keeping the rows.
     pub(crate) fn new(problem: &LeastSquares<'_, A>) -> Result<Self> {
         Self::from_prepared(Prepared::new(problem))
@@ -78,34 +78,38 @@ impl<A: Scalar> Spectrum<A> {
     }
 
     /// For a problem that a QR factorisation has reduced to its triangle.
-    pub(crate) fn of_triangle(triangle: Triangular<A>, frame: Frame<A>) -> Result<Self> {
-        let Triangular { r, qtb, unreached } = triangle;
-        Self::decompose(Route::QrSvd, r.view(), qtb, unreached, frame)
+    pub(crate) fn of_triangle(triangle: QrFactor<A>, frame: Equilibration<A>) -> Result<Self> {
+        let QrFactor {
+            r,
+            qtb,
+            residual_ss,
+        } = triangle;
+        Self::decompose(Route::QrSvd, r.view(), qtb, residual_ss, frame)
     }
 
-    /// `unreached` is what of each output's sum of squares is not in `targets`.
+    /// `residual_ss` is what of each output's sum of squares is not in `targets`.
     fn decompose(
         route: Route,
         hidden: ArrayView2<'_, A>,
         targets: Array2<A>,
-        mut unreached: Array1<A>,
-        frame: Frame<A>,
+        mut residual_ss: Array1<A>,
+        frame: Equilibration<A>,
     ) -> Result<Self> {
         let lengths = frame.lengths(hidden);
         let Svd { u, s, vt } = truncate(A::svd(hidden)?, frame.weighted_rows);
         let c = A::product(u.t(), targets.view());
         if frame.spanned_by(s.len()) {
-            unreached.fill(A::zero());
+            residual_ss.fill(A::zero());
         } else {
             let residual = targets - A::product(u.view(), c.view());
-            unreached += &squares(residual.view());
+            residual_ss += &squares(residual.view());
         }
         Ok(Self {
             route,
             s,
             vt,
             c,
-            unreached,
+            residual_ss,
             lengths,
             frame,
         })
@@ -151,7 +155,7 @@ impl<A: Scalar> Spectrum<A> {
             let left = Zip::from(kept(o))
                 .and(self.c.column(o))
                 .fold(A::zero(), |sum, &f, &c| sum + ((A::one() - f) * c).powi(2));
-            (left + self.unreached[o]).sqrt().as_f64()
+            (left + self.residual_ss[o]).sqrt().as_f64()
         });
         let rank = self.rank(cutoff);
         let singular_value = |i: usize| {
@@ -186,19 +190,19 @@ impl<A: Scalar> Spectrum<A> {
     pub(crate) fn ridge_gain(&self, lambda: &[A]) -> Array2<A> {
         let mut gain = Array2::zeros((self.s.len(), lambda.len()));
         for (mut column, &lambda) in gain.columns_mut().into_iter().zip(lambda) {
-            column.assign(&(self.ridge_kept(lambda) / &self.s));
+            column.assign(&(self.filter_factors(lambda) / &self.s));
         }
         gain
     }
 
     /// What ridge keeps of each direction, $s_j^2 / (s_j^2 + \lambda s_1^2)$.
-    pub(crate) fn ridge_kept(&self, lambda: A) -> Array1<A> {
+    pub(crate) fn filter_factors(&self, lambda: A) -> Array1<A> {
         self.s.mapv(|s| share((s / self.s[0]).powi(2), lambda))
     }
 
     /// What ridge holds back of each direction, $\lambda s_1^2 / (s_j^2 + \lambda s_1^2)$:
     /// nothing at $\lambda = 0$, all at infinity.
-    pub(crate) fn ridge_held_back(&self, lambda: A) -> Array1<A> {
+    pub(crate) fn filter_complements(&self, lambda: A) -> Array1<A> {
         self.s.mapv(|s| share(lambda, (s / self.s[0]).powi(2)))
     }
 
@@ -246,7 +250,7 @@ impl<A: Scalar> Spectrum<A> {
 
     /// For each output the sum of squares of $\tilde T$.
     pub(crate) fn total_squares(&self) -> Array1<A> {
-        squares(self.c.view()) + &self.unreached
+        squares(self.c.view()) + &self.residual_ss
     }
 
     /// The sum of the row weights, the largest being 1.
@@ -260,7 +264,7 @@ impl<A: Scalar> Spectrum<A> {
     }
 }
 
-impl<A: Scalar> RowSpectrum<A> {
+impl<A: Scalar> DesignSvdWithRows<A> {
     /// Factorises and keeps the rows.
     pub(crate) fn new(problem: &LeastSquares<'_, A>) -> Result<Self> {
         let Prepared {
@@ -289,7 +293,7 @@ impl<A: Scalar> RowSpectrum<A> {
         targets: Array2<A>,
         constant: Array1<A>,
         absent: Array1<A>,
-        frame: Frame<A>,
+        frame: Equilibration<A>,
     ) -> Result<Self> {
         let lengths = frame.lengths(hidden.view());
         let Svd { u, s, vt } = truncate(A::svd(hidden.view())?, frame.weighted_rows);
@@ -298,11 +302,11 @@ impl<A: Scalar> RowSpectrum<A> {
         let mut rows = Self {
             free: absent,
             residual: Array2::zeros(targets.dim()),
-            spectrum: Spectrum {
+            spectrum: DesignSvd {
                 route: Route::Svd,
                 s,
                 vt,
-                unreached: Array1::zeros(targets.ncols()),
+                residual_ss: Array1::zeros(targets.ncols()),
                 c,
                 lengths,
                 frame,
@@ -313,7 +317,7 @@ impl<A: Scalar> RowSpectrum<A> {
         if !spanned {
             rows.residual = rows.off_span(targets);
             rows.measure_freedom();
-            rows.spectrum.unreached = squares(rows.residual.view());
+            rows.spectrum.residual_ss = squares(rows.residual.view());
         }
         Ok(rows)
     }
