@@ -80,25 +80,25 @@ pub trait Fit {
 /// directions, and all numbers finite.
 pub(crate) fn check(pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<()> {
     if values.is_empty() {
-        return Err(Error::Elm(elm::Error::Empty {
+        return Err(Error::Empty {
             what: "measurements",
             rows: values.nrows(),
             columns: values.ncols(),
-        }));
+        });
     }
     if values.nrows() != pairs.len() {
-        return Err(Error::Elm(elm::Error::Shape {
+        return Err(Error::Shape {
             what: "rows of values",
             expected: pairs.len(),
             found: values.nrows(),
-        }));
+        });
     }
     if let Some(((row, column), _)) = values.indexed_iter().find(|(_, v)| !v.is_finite()) {
-        return Err(Error::Elm(elm::Error::NotFinite {
+        return Err(Error::NotFinite {
             what: "measurements",
             row,
             column,
-        }));
+        });
     }
     check_directions(pairs)
 }
@@ -108,11 +108,11 @@ pub(crate) fn check_directions(pairs: &[Pair]) -> Result<()> {
     for (row, pair) in pairs.iter().enumerate() {
         let mut components = pair.incident.iter().chain(&pair.outgoing);
         if let Some(column) = components.position(|c| !c.is_finite()) {
-            return Err(Error::Elm(elm::Error::NotFinite {
+            return Err(Error::NotFinite {
                 what: "directions",
                 row,
                 column,
-            }));
+            });
         }
     }
     Ok(())

@@ -17,6 +17,60 @@ pub enum Error {
     /// The network could not be fitted or evaluated.
     #[error(transparent)]
     Elm(#[from] elm::Error),
+    /// A setting is out of range.
+    #[error("{name} is {value}, but must be {expected}")]
+    Parameter {
+        /// The setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        expected: &'static str,
+    },
+    /// There is nothing to work on.
+    #[error("{what} is empty ({rows} x {columns})")]
+    Empty {
+        /// Which array.
+        what: &'static str,
+        /// Its rows.
+        rows: usize,
+        /// Its columns.
+        columns: usize,
+    },
+    /// Sizes do not fit each other.
+    #[error("{what}: expected {expected}, found {found}")]
+    Shape {
+        /// Which size.
+        what: &'static str,
+        /// What it should be.
+        expected: usize,
+        /// What it is.
+        found: usize,
+    },
+    /// A NaN or infinity.
+    #[error("{what}: the value at row {row}, column {column} (counted from 0) is not finite")]
+    NotFinite {
+        /// Which array.
+        what: &'static str,
+        /// Its row, counted from 0.
+        row: usize,
+        /// Its column, counted from 0.
+        column: usize,
+    },
+    /// Two things that cannot be had together.
+    #[error("{first} and {second} exclude each other")]
+    Conflict {
+        /// One of them.
+        first: &'static str,
+        /// The other.
+        second: &'static str,
+    },
+    /// A search or an iteration came to no result.
+    #[error("{what} did not converge")]
+    NoConvergence {
+        /// Which.
+        what: &'static str,
+    },
     /// A model's file could not be written or read.
     #[error(transparent)]
     File(#[from] elm::persist::Error),

@@ -77,16 +77,16 @@ impl Link {
     /// Measures the scale of each channel of `values`, BRDF in 1/sr of shape (pairs, channels).
     ///
     /// # Errors
-    /// [`elm::Error::Parameter`] for an offset that is not positive and finite.
+    /// [`Error::Parameter`](crate::Error::Parameter) for an offset that is not positive and finite.
     pub fn fit(self, values: ArrayView2<'_, f64>) -> Result<FittedLink> {
         if let Self::Log { offset } = self
             && !(offset > 0.0 && offset.is_finite())
         {
-            return Err(Error::Elm(elm::Error::Parameter {
+            return Err(Error::Parameter {
                 name: "offset of the log link",
                 value: offset,
                 expected: "positive and finite",
-            }));
+            });
         }
         let channels = values.columns().into_iter();
         Ok(FittedLink {
@@ -215,10 +215,10 @@ impl FittedLink {
     /// finite and not negative.
     ///
     /// # Errors
-    /// [`elm::Error::Parameter`] for the first that is not.
-    pub(crate) fn check(&self) -> Result<(), elm::Error> {
+    /// [`Error::Parameter`](crate::Error::Parameter) for the first that is not.
+    pub(crate) fn check(&self) -> Result<()> {
         let parameter = |name, value, expected| {
-            Err(elm::Error::Parameter {
+            Err(Error::Parameter {
                 name,
                 value,
                 expected,
@@ -313,7 +313,7 @@ impl FittedLink {
     /// the offset below 0.
     ///
     /// # Errors
-    /// [`elm::Error::Shape`] for another number of channels than the link was fitted to.
+    /// [`Error::Shape`](crate::Error::Shape) for another number of channels than the link was fitted to.
     pub fn to_targets(&self, values: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
         self.map(values.to_owned(), Channel::target)
     }
@@ -324,18 +324,18 @@ impl FittedLink {
     /// the largest value that the link was fitted to. A target that is NaN stays NaN.
     ///
     /// # Errors
-    /// [`elm::Error::Shape`] for another number of channels than the link was fitted to.
+    /// [`Error::Shape`](crate::Error::Shape) for another number of channels than the link was fitted to.
     pub fn to_values(&self, targets: Array2<f64>) -> Result<Array2<f64>> {
         self.map(targets, Channel::value)
     }
 
     fn map(&self, mut matrix: Array2<f64>, f: fn(Channel, f64) -> f64) -> Result<Array2<f64>> {
         if matrix.ncols() != self.channels.len() {
-            return Err(Error::Elm(elm::Error::Shape {
+            return Err(Error::Shape {
                 what: "channels of the link",
                 expected: self.channels.len(),
                 found: matrix.ncols(),
-            }));
+            });
         }
         for (mut column, &channel) in matrix.columns_mut().into_iter().zip(&self.channels) {
             column.mapv_inplace(|entry| f(channel, entry));

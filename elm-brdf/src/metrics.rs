@@ -130,12 +130,10 @@ impl Metrics {
         predicted: ArrayView2<'_, f64>,
         truth: ArrayView2<'_, f64>,
     ) -> Result<Self> {
-        let shape = |what, expected, found| {
-            Error::Elm(elm::Error::Shape {
-                what,
-                expected,
-                found,
-            })
+        let shape = |what, expected, found| Error::Shape {
+            what,
+            expected,
+            found,
         };
         if predicted.ncols() != truth.ncols() {
             return Err(shape("channels", truth.ncols(), predicted.ncols()));

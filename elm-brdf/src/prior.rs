@@ -125,16 +125,16 @@ impl PriorParams {
     /// Learns from `values` (BRDF in 1/sr, shape (pairs, materials)), all measured at `pairs`.
     ///
     /// # Errors
-    /// Where these materials cannot be fitted; [`elm::Error::Shape`] of a single material, which has
+    /// Where these materials cannot be fitted; [`Error::Shape`](crate::Error::Shape) of a single material, which has
     /// no spread.
     pub fn build(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Prior> {
         check(pairs, values)?;
         if values.ncols() < 2 {
-            return Err(Error::Elm(elm::Error::Shape {
+            return Err(Error::Shape {
                 what: "materials of a prior",
                 expected: 2,
                 found: values.ncols(),
-            }));
+            });
         }
         let x = self.features.compute_training(pairs);
         let scaler = Scaler::measured(&x)?;
@@ -205,16 +205,16 @@ impl Prior {
     /// it was built from.
     ///
     /// # Errors
-    /// [`elm::Error::Shape`] where fewer than two are left.
+    /// [`Error::Shape`](crate::Error::Shape) where fewer than two are left.
     pub fn without(&self, places: &[usize]) -> Result<Self> {
         let all = self.materials();
         let left: Vec<usize> = (0..all).filter(|place| !places.contains(place)).collect();
         if left.len() < 2 {
-            return Err(Error::Elm(elm::Error::Shape {
+            return Err(Error::Shape {
                 what: "materials of a prior",
                 expected: 2,
                 found: left.len(),
-            }));
+            });
         }
         let root = (all as f64).sqrt();
         let beta = self.deviations.beta.select(Axis(1), &left) * root
@@ -294,11 +294,11 @@ impl Prior {
             let rho = (general * relative).sqrt();
             let design =
                 concatenate(Axis(1), &[taught.view(), (&h * rho).view()]).map_err(|_| {
-                    Error::Elm(elm::Error::Empty {
+                    Error::Empty {
                         what: "columns of the prior",
                         rows: h.nrows(),
                         columns: h.ncols(),
-                    })
+                    }
                 })?;
             let problem = LeastSquares::new(&design, &rest)?.intercept(true);
             if let Some(sum) = left_out.as_deref_mut() {
@@ -375,11 +375,11 @@ impl TryFrom<File> for Prior {
             ),
         ] {
             if expected != found {
-                return Err(Error::Elm(elm::Error::Shape {
+                return Err(Error::Shape {
                     what,
                     expected,
                     found,
-                }));
+                });
             }
         }
         let numbers = file.mean.beta.iter().chain(&file.mean.constant);
@@ -387,11 +387,11 @@ impl TryFrom<File> for Prior {
             .chain(&file.deviations.beta)
             .chain(&file.deviations.constant);
         if numbers.into_iter().any(|number| !number.is_finite()) {
-            return Err(Error::Elm(elm::Error::NotFinite {
+            return Err(Error::NotFinite {
                 what: "weights of the prior",
                 row: 0,
                 column: 0,
-            }));
+            });
         }
         let map = FeatureMap::new(file.scaler, file.params.draw(inputs)?, false)?;
         Ok(Self {

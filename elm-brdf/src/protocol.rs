@@ -261,7 +261,7 @@ impl<'a> Group<'a> {
             .iter()
             .map(|material| material.values.view())
             .collect();
-        let values = concatenate(Axis(1), &views).map_err(|_| elm::Error::Empty {
+        let values = concatenate(Axis(1), &views).map_err(|_| Error::Empty {
             what: "measurements",
             rows: rows.len(),
             columns: 0,

@@ -87,7 +87,7 @@ impl<A: Real> Columns<A> {
     /// of those towards the viewer, in the frame of the surface.
     ///
     /// # Errors
-    /// [`elm::Error::Shape`] unless all six are of one length.
+    /// [`Error::Shape`](crate::Error::Shape) unless all six are of one length.
     pub fn from_components(incident: [Vec<A>; 3], outgoing: [Vec<A>; 3]) -> Result<Self> {
         let [a, b, c] = incident;
         let [d, e, f] = outgoing;
@@ -95,11 +95,11 @@ impl<A: Real> Columns<A> {
         let expected = components[0].len();
         match components.iter().find(|part| part.len() != expected) {
             None => Ok(Self { components }),
-            Some(part) => Err(Error::Elm(elm::Error::Shape {
+            Some(part) => Err(Error::Shape {
                 what: "directions",
                 expected,
                 found: part.len(),
-            })),
+            }),
         }
     }
 
@@ -126,7 +126,7 @@ pub trait Batched<A: Real>: Sync {
     /// values of no meaning.
     ///
     /// # Errors
-    /// [`elm::Error::Shape`] unless `out` has a value for each pair and channel.
+    /// [`Error::Shape`](crate::Error::Shape) unless `out` has a value for each pair and channel.
     fn eval_into(&self, directions: &Columns<A>, out: &mut [A]) -> Result<()>;
 }
 
@@ -174,11 +174,11 @@ pub(crate) fn run<A: Real, K: Kernel<A>>(
     let rows = directions.len();
     // Not more than what is in memory already times what a model has.
     if Some(out.len()) != rows.checked_mul(channels) {
-        return Err(Error::Elm(elm::Error::Shape {
+        return Err(Error::Shape {
             what: "values",
             expected: rows.saturating_mul(channels),
             found: out.len(),
-        }));
+        });
     }
     Arch::new().dispatch(Run {
         kernel,

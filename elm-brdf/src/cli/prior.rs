@@ -70,11 +70,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let data = source.load(&materials, Invalid::Clamp)?;
     let values: Vec<_> = data.materials.iter().map(|m| m.values.view()).collect();
     let values = concatenate(Axis(1), &values).map_err(|_| {
-        usage(Error::Elm(elm::Error::Empty {
+        usage(Error::Empty {
             what: "materials of a prior",
             rows: data.directions.len(),
             columns: 0,
-        }))
+        })
     })?;
     let params = PriorParams {
         neurons: build.neurons,

@@ -13,7 +13,7 @@ impl BrdfModel {
     /// wavelength. A model whose channels have no names takes them as they come.
     ///
     /// # Errors
-    /// [`Error::ChannelNames`] for samples that lack one; [`elm::Error::Shape`] for another number
+    /// [`Error::ChannelNames`] for samples that lack one; [`Error::Shape`](crate::Error::Shape) for another number
     /// of channels than that of a model without names.
     pub fn matched(&self, samples: Samples) -> Result<Samples> {
         let own = &self.provenance.channels;
@@ -26,11 +26,11 @@ impl BrdfModel {
         if samples.channels.len() == self.channels() {
             return Ok(samples);
         }
-        Err(Error::Elm(elm::Error::Shape {
+        Err(Error::Shape {
             what: "channels of the samples",
             expected: self.channels(),
             found: samples.channels.len(),
-        }))
+        })
     }
 
     /// The model with red first, then green, then blue, where its three channels are called by

@@ -6,6 +6,7 @@ use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
 
 use super::{BrdfModel, Layer, Provenance};
+use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::link::FittedLink;
 
@@ -37,9 +38,9 @@ impl From<BrdfModel> for File {
 }
 
 impl TryFrom<File> for BrdfModel {
-    type Error = elm::Error;
+    type Error = Error;
 
-    fn try_from(file: File) -> Result<Self, elm::Error> {
+    fn try_from(file: File) -> Result<Self> {
         let inputs = file.features.inputs().len();
         let links = if file.direct_links { inputs } else { 0 };
         // Of a file that lies there may be fewer rows than links.
@@ -56,7 +57,7 @@ impl TryFrom<File> for BrdfModel {
             ),
         ] {
             if expected != found {
-                return Err(elm::Error::Shape {
+                return Err(Error::Shape {
                     what,
                     expected,
                     found,

@@ -3,6 +3,8 @@
 use elm::{FeatureMapParams, HiddenLayer};
 use serde::{Deserialize, Serialize};
 
+use crate::error::{Error, Result};
+
 /// A random layer that is drawn again from its settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Draw {
@@ -40,8 +42,8 @@ impl Layer {
     /// The layer of `neurons` neurons for this many inputs.
     ///
     /// # Errors
-    /// [`elm::Error`] for settings out of range, or of another number of neurons.
-    pub(crate) fn hidden(&self, inputs: usize, neurons: usize) -> elm::Result<HiddenLayer<f64>> {
+    /// [`Error`] for settings out of range, or of another number of neurons.
+    pub(crate) fn hidden(&self, inputs: usize, neurons: usize) -> Result<HiddenLayer<f64>> {
         let draws = match self {
             Self::Stored(layer) => return Ok(layer.clone()),
             Self::Drawn(draws) => draws,
@@ -72,7 +74,7 @@ impl Layer {
                 }
             });
         }
-        HiddenLayer::joined(&layers)
+        Ok(HiddenLayer::joined(&layers)?)
     }
 
     /// Numbers that must be kept.
@@ -90,11 +92,11 @@ impl Layer {
     }
 }
 
-fn check(what: &'static str, expected: usize, found: usize) -> elm::Result<()> {
+fn check(what: &'static str, expected: usize, found: usize) -> Result<()> {
     if expected == found {
         Ok(())
     } else {
-        Err(elm::Error::Shape {
+        Err(Error::Shape {
             what,
             expected,
             found,

@@ -20,16 +20,16 @@ pub struct ScaledOnce(BrdfParams);
 
 impl ScaledOnce {
     /// # Errors
-    /// [`elm::Error::Conflict`] for a link other than [`Link::Identity`], which is fitted to each
+    /// [`Error::Conflict`](crate::Error::Conflict) for a link other than [`Link::Identity`], which is fitted to each
     /// fold's values.
     pub fn new(params: BrdfParams) -> Result<Self> {
         if params.link == Link::Identity {
             return Ok(Self(params));
         }
-        Err(Error::Elm(elm::Error::Conflict {
+        Err(Error::Conflict {
             first: "a link other than identity",
             second: "inputs scaled once",
-        }))
+        })
     }
 }
 

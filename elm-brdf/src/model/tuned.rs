@@ -125,9 +125,9 @@ impl Tuned {
             return many::fit(self, pairs, values);
         }
         let mut models = few::fit(self, pairs, values, &[all])?;
-        models.pop().ok_or(Error::Elm(elm::Error::NoConvergence {
+        models.pop().ok_or(Error::NoConvergence {
             what: "the search for a network",
-        }))
+        })
     }
 
     /// The sets of inputs to choose among: all but the paper's, which no material is best served by.
@@ -182,11 +182,11 @@ impl Tuned {
             (Some(neurons), None) if self.neurons.is_none() => Ok(neurons.max(least)),
             (Some(neurons), _) => Ok(neurons),
             (None, None) => Ok(least),
-            (None, Some(_)) => Err(Error::Elm(elm::Error::Parameter {
+            (None, Some(_)) => Err(Error::Parameter {
                 name: "max_floats",
                 value: most as f64,
                 expected: "enough for the scales, the links and one neuron: some 20 and more",
-            })),
+            }),
         }
     }
 

@@ -39,15 +39,15 @@ impl Prior {
     /// ```
     ///
     /// # Errors
-    /// [`elm::Error::Parameter`] for more than there are pairs; directions that are none.
+    /// [`Error::Parameter`](crate::Error::Parameter) for more than there are pairs; directions that are none.
     pub fn design(&self, pairs: &[Pair], count: usize) -> Result<Vec<usize>> {
         check_directions(pairs)?;
         if count > pairs.len() {
-            return Err(Error::Elm(elm::Error::Parameter {
+            return Err(Error::Parameter {
                 name: "count",
                 value: count as f64,
                 expected: "at most the number of pairs",
-            }));
+            });
         }
         let h = self.map.transform(&self.features.compute(pairs))?;
         let mean = h.dot(&self.mean.beta) + self.mean.constant[0];

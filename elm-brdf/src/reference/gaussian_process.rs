@@ -119,11 +119,11 @@ fn kernel(covariance: Covariance, a: &Array2<f64>, b: &Array2<f64>) -> Array2<f6
 impl Fit for GaussianProcess {
     fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
         if self.candidates == 0 {
-            return Err(Error::Elm(elm::Error::Parameter {
+            return Err(Error::Parameter {
                 name: "candidates",
                 value: 0.0,
                 expected: "at least 1",
-            }));
+            });
         }
         let (frame, x, targets) = Frame::fit(self.features, self.link, pairs, values)?;
         check_rows("a Gaussian process", x.nrows())?;

@@ -50,7 +50,7 @@ impl Projected {
         let slice = projected.as_slice_memory_order().unwrap_or(&[]);
         let eigen = MatRef::from_row_major_slice(slice, rows, rows)
             .self_adjoint_eigen(Side::Lower)
-            .map_err(|_| elm::Error::NoConvergence {
+            .map_err(|_| Error::NoConvergence {
                 what: "the eigenvalue decomposition of a kernel matrix",
             })?;
         let (values, vectors) = (eigen.S().column_vector(), eigen.U());

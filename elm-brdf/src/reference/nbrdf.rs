@@ -46,22 +46,22 @@ impl Nbrdf {
     /// The inputs are $\sin\theta_h$, 0, $\cos\theta_h$, $d_x$, $d_y$, $d_z$.
     ///
     /// # Errors
-    /// [`elm::Error::Shape`] for another count, [`elm::Error::NotFinite`] naming the first number
+    /// [`Error::Shape`](crate::Error::Shape) for another count, [`Error::NotFinite`](crate::Error::NotFinite) naming the first number
     /// that is not finite.
     pub fn new(weights: &[f32]) -> Result<Self> {
         if weights.len() != Self::FLOATS {
-            return Err(Error::Elm(elm::Error::Shape {
+            return Err(Error::Shape {
                 what: "weights of NBRDF",
                 expected: Self::FLOATS,
                 found: weights.len(),
-            }));
+            });
         }
         if let Some(row) = weights.iter().position(|weight| !weight.is_finite()) {
-            return Err(Error::Elm(elm::Error::NotFinite {
+            return Err(Error::NotFinite {
                 what: "weights of NBRDF",
                 row,
                 column: 0,
-            }));
+            });
         }
         // Matrix and biases of a layer, and the rest.
         fn layer(numbers: &[f32], inputs: usize, outputs: usize) -> (&[f32], &[f32], &[f32]) {
@@ -120,7 +120,7 @@ impl Nbrdf {
     /// BRDF in 1/sr, without the cosine: all reds, all greens, all blues.
     ///
     /// # Errors
-    /// [`elm::Error::Shape`] unless `out` has three values for each pair.
+    /// [`Error::Shape`](crate::Error::Shape) unless `out` has three values for each pair.
     pub fn eval_into(&self, directions: &Columns<f32>, out: &mut [f32]) -> Result<()> {
         run(self, CHANNELS, directions, out)
     }

@@ -56,11 +56,11 @@ impl Neighbours {
 impl Fit for Neighbours {
     fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
         if self.count == 0 {
-            return Err(Error::Elm(elm::Error::Parameter {
+            return Err(Error::Parameter {
                 name: "number of neighbours",
                 value: 0.0,
                 expected: "at least 1",
-            }));
+            });
         }
         let (frame, nodes, targets) = Frame::fit(self.features, self.link, pairs, values)?;
         let powers = if self.count == 1 {

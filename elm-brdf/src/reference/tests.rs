@@ -328,15 +328,12 @@ fn bad_measurements_are_refused_by_name() {
         let fit =
             |pairs: &[Pair], values: &Array2<f64>| reference.method.fit(pairs, values.view()).err();
         let empty = fit(&[], &Array2::zeros((0, 1)));
-        assert!(matches!(empty, Some(Error::Elm(elm::Error::Empty { .. }))));
+        assert!(matches!(empty, Some(Error::Empty { .. })));
         let short = fit(&pairs[..9], &good);
-        assert!(matches!(
-            short,
-            Some(Error::Elm(elm::Error::Shape { expected: 9, .. }))
-        ));
+        assert!(matches!(short, Some(Error::Shape { expected: 9, .. })));
         for (error, row) in [(fit(&pairs, &hole), 7), (fit(&lost, &good), 4)] {
             match error {
-                Some(Error::Elm(elm::Error::NotFinite { row: found, .. })) => {
+                Some(Error::NotFinite { row: found, .. }) => {
                     assert_eq!(found, row);
                 }
                 other => panic!("{}: {other:?}", reference.name),

@@ -11,9 +11,9 @@ use crate::metrics::Metric;
 const QUANTILE: f64 = 0.99;
 
 pub(super) fn no_fit() -> Error {
-    Error::Elm(elm::Error::NoConvergence {
+    Error::NoConvergence {
         what: "the search for a strength of regularisation",
-    })
+    }
 }
 
 /// What an error of a row's target is in the metric: to first order

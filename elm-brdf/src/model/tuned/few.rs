@@ -259,9 +259,9 @@ impl<'a> Search<'a> {
                 Some(known) => better(known, finished),
             });
         }
-        found.ok_or(Error::Elm(elm::Error::NoConvergence {
+        found.ok_or(Error::NoConvergence {
             what: "the search for a network",
-        }))
+        })
     }
 
     /// The best candidates of a set side by side in one network.

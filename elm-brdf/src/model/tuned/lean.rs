@@ -10,7 +10,7 @@ use super::errors::row_weights;
 use super::many::RIDGE;
 use super::{Drawn, provenance};
 use crate::brdf::{Brdf, Fit, check};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::geometry::Pair;
 use crate::link::{FittedLink, Link};
@@ -133,10 +133,9 @@ impl Lean {
             }
         }
         let Some(mut best) = best else {
-            return Err(elm::Error::NoConvergence {
+            return Err(Error::NoConvergence {
                 what: "the search for a network",
-            }
-            .into());
+            });
         };
         if pairs.len() > ROWS {
             for (step, input) in STEPS

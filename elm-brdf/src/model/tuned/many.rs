@@ -81,9 +81,9 @@ pub(super) fn fit(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) ->
 }
 
 fn no_search() -> Error {
-    Error::Elm(elm::Error::NoConvergence {
+    Error::NoConvergence {
         what: "the search for a network",
-    })
+    }
 }
 
 /// Draws more neurons than wanted, keeps the most useful, and fits them.
