@@ -248,9 +248,10 @@ impl<'a> Search<'a> {
         let mut found: Option<Finished> = None;
         for (number, &set) in order.iter().enumerate() {
             let set = &self.sets[set];
-            let close = set.best(channels) >= least && number < SETS + 1;
+            let usual = set.features == Features::SumDifference;
+            let close = usual || set.best(channels) >= least && number < SETS + 1;
             let physical = found.as_ref().is_some_and(|found| found.excess <= 0.0);
-            if physical && !close || number >= MOST_FINISHED {
+            if physical && !close || number >= MOST_FINISHED && !usual {
                 continue;
             }
             let finished = self.finished(set, channels, problem)?;

@@ -13,7 +13,7 @@ pub(super) const TILE: usize = 4096;
 /// Strengths tried: two to a decade from [`WEAKEST`].
 pub(super) const STRENGTHS: usize = 29;
 /// What anchors count at first, against what their guess is worth.
-pub(super) const ANCHORED: f64 = 0.1;
+pub(super) const ANCHORED: f64 = 1e-3;
 
 /// A layer at the rows.
 pub(super) struct Rows {
