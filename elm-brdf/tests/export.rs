@@ -271,7 +271,7 @@ fn reach(model: &BrdfModel, channel: usize, value: f64, t_error: f64) -> f64 {
 fn check(name: &str, model: &dyn Brdf, pairs: &[Pair], found: &[[f64; 3]]) -> f64 {
     assert_eq!(found.len(), pairs.len(), "{name}");
     let expected = expected(model, pairs);
-    let bounds = bounds(BrdfModel::of(&*model).unwrap(), pairs);
+    let bounds = bounds(BrdfModel::of(model).unwrap(), pairs);
     let mut worst: f64 = 0.0;
     let mut compared = 0;
     for (row, pair) in pairs.iter().enumerate() {

@@ -209,7 +209,7 @@ fn models_come_back_from_files_of_both_forms_bit_for_bit() {
 fn stored_numbers_are_those_that_the_file_holds() {
     let [averaged, single, pruned, given, on_rows, linked] = kinds().try_into().unwrap();
     // Weights; for each input its mean, its factor and a scale in each draw; constant, offset and
-    // ceiling. As many as were measured.
+    // ceiling. Twice as many as were measured.
     let (neurons, inputs) = (
         averaged.network().hidden().neurons(),
         averaged.network().inputs(),
@@ -218,7 +218,7 @@ fn stored_numbers_are_those_that_the_file_holds() {
         averaged.stored_floats(),
         neurons + (2 + Tuned::MEMBERS) * inputs + 3
     );
-    assert_eq!(averaged.stored_floats(), 205);
+    assert_eq!(averaged.stored_floats(), 410);
     assert_eq!(single.stored_floats(), 40 * 3 + 4 + 3 + 8 + 6);
     // 160 drawn, a bit each.
     let channels = pruned.channels();

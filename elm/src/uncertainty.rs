@@ -230,7 +230,7 @@ impl<A: Scalar> UncertainElm<A> {
             left_out.scaled_add(share, &member.left_out);
             // Of the fit without the row: h / (1 - h).
             variances.zip_mut_with(&member.freedom, |v: &mut A, &f| {
-                *v += share * (f.recip() - A::one())
+                *v += share * (f.recip() - A::one());
             });
         }
         let scores = Zip::from(&left_out)

@@ -221,7 +221,7 @@ fn a_file_that_contradicts_itself_is_refused() {
         mutate(&|c| c["beta"]["dim"] = huge.clone()),
         mutate(&|c| c["beta"] = serde_json::json!({"v": 1, "dim": [1, 2], "data": [0.0, 0.0]})),
         mutate(&|c| {
-            c["map"]["scaler"]["mean"] = serde_json::json!({"v": 1, "dim": [1], "data": [0.0]})
+            c["map"]["scaler"]["mean"] = serde_json::json!({"v": 1, "dim": [1], "data": [0.0]});
         }),
         mutate(&|c| c["beta"]["data"][0] = serde_json::json!(null)),
         mutate(&|c| c["map"]["layer"]["groups"][0]["activation"] = serde_json::json!("cube")),
