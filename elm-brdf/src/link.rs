@@ -77,7 +77,7 @@ impl Link {
     /// Measures the scale of each channel of `values`, BRDF in 1/sr of shape (pairs, channels).
     ///
     /// # Errors
-    /// [`Error::Parameter`](crate::Error::Parameter) for an offset that is not positive and finite.
+    /// [`Error::Parameter`] for an offset that is not positive and finite.
     pub fn fit(self, values: ArrayView2<'_, f64>) -> Result<FittedLink> {
         if let Self::Log { offset } = self
             && !(offset > 0.0 && offset.is_finite())
@@ -215,7 +215,7 @@ impl FittedLink {
     /// finite and not negative.
     ///
     /// # Errors
-    /// [`Error::Parameter`](crate::Error::Parameter) for the first that is not.
+    /// [`Error::Parameter`] for the first that is not.
     pub(crate) fn check(&self) -> Result<()> {
         let parameter = |name, value, expected| {
             Err(Error::Parameter {
@@ -313,7 +313,7 @@ impl FittedLink {
     /// the offset below 0.
     ///
     /// # Errors
-    /// [`Error::Shape`](crate::Error::Shape) for another number of channels than the link was fitted to.
+    /// [`Error::Shape`] for another number of channels than the link was fitted to.
     pub fn to_targets(&self, values: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
         self.map(values.to_owned(), Channel::target)
     }
@@ -324,7 +324,7 @@ impl FittedLink {
     /// the largest value that the link was fitted to. A target that is NaN stays NaN.
     ///
     /// # Errors
-    /// [`Error::Shape`](crate::Error::Shape) for another number of channels than the link was fitted to.
+    /// [`Error::Shape`] for another number of channels than the link was fitted to.
     pub fn to_values(&self, targets: Array2<f64>) -> Result<Array2<f64>> {
         self.map(targets, Channel::value)
     }

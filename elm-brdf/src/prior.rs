@@ -125,7 +125,7 @@ impl PriorParams {
     /// Learns from `values` (BRDF in 1/sr, shape (pairs, materials)), all measured at `pairs`.
     ///
     /// # Errors
-    /// Where these materials cannot be fitted; [`Error::Shape`](crate::Error::Shape) of a single material, which has
+    /// Where these materials cannot be fitted; [`Error::Shape`] of a single material, which has
     /// no spread.
     pub fn build(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Prior> {
         check(pairs, values)?;
@@ -205,7 +205,7 @@ impl Prior {
     /// it was built from.
     ///
     /// # Errors
-    /// [`Error::Shape`](crate::Error::Shape) where fewer than two are left.
+    /// [`Error::Shape`] where fewer than two are left.
     pub fn without(&self, places: &[usize]) -> Result<Self> {
         let all = self.materials();
         let left: Vec<usize> = (0..all).filter(|place| !places.contains(place)).collect();

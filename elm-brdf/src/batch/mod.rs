@@ -87,7 +87,7 @@ impl<A: Real> Columns<A> {
     /// of those towards the viewer, in the frame of the surface.
     ///
     /// # Errors
-    /// [`Error::Shape`](crate::Error::Shape) unless all six are of one length.
+    /// [`Error::Shape`] unless all six are of one length.
     pub fn from_components(incident: [Vec<A>; 3], outgoing: [Vec<A>; 3]) -> Result<Self> {
         let [a, b, c] = incident;
         let [d, e, f] = outgoing;
@@ -126,7 +126,7 @@ pub trait Batched<A: Real>: Sync {
     /// values of no meaning.
     ///
     /// # Errors
-    /// [`Error::Shape`](crate::Error::Shape) unless `out` has a value for each pair and channel.
+    /// [`Error::Shape`] unless `out` has a value for each pair and channel.
     fn eval_into(&self, directions: &Columns<A>, out: &mut [A]) -> Result<()>;
 }
 

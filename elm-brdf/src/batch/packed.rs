@@ -56,7 +56,7 @@ impl<A: Real> Packed<A> {
     /// Packs a model.
     ///
     /// # Errors
-    /// [`Error::Conflict`](crate::Error::Conflict) for a network with radial neurons, direct links or a function of
+    /// [`Error::Conflict`] for a network with radial neurons, direct links or a function of
     /// the user's own.
     pub fn new(model: &BrdfModel) -> Result<Self> {
         let refused = |first| {
@@ -271,7 +271,7 @@ impl<A: Real> Packed<A> {
     /// BRDF in 1/sr, without the cosine: all values of the first channel, then those of the next.
     ///
     /// # Errors
-    /// [`Error::Shape`](crate::Error::Shape) unless `out` has a value for each pair and channel.
+    /// [`Error::Shape`] unless `out` has a value for each pair and channel.
     pub fn eval_into(&self, directions: &Columns<A>, out: &mut [A]) -> Result<()> {
         run(self, self.links.len(), directions, out)
     }

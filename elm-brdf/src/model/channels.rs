@@ -13,7 +13,7 @@ impl BrdfModel {
     /// wavelength. A model whose channels have no names takes them as they come.
     ///
     /// # Errors
-    /// [`Error::ChannelNames`] for samples that lack one; [`Error::Shape`](crate::Error::Shape) for another number
+    /// [`Error::ChannelNames`] for samples that lack one; [`Error::Shape`] for another number
     /// of channels than that of a model without names.
     pub fn matched(&self, samples: Samples) -> Result<Samples> {
         let own = &self.provenance.channels;

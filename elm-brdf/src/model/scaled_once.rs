@@ -20,7 +20,7 @@ pub struct ScaledOnce(BrdfParams);
 
 impl ScaledOnce {
     /// # Errors
-    /// [`Error::Conflict`](crate::Error::Conflict) for a link other than [`Link::Identity`], which is fitted to each
+    /// [`Error::Conflict`] for a link other than [`Link::Identity`], which is fitted to each
     /// fold's values.
     pub fn new(params: BrdfParams) -> Result<Self> {
         if params.link == Link::Identity {

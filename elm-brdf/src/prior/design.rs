@@ -39,7 +39,7 @@ impl Prior {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Parameter`](crate::Error::Parameter) for more than there are pairs; directions that are none.
+    /// [`Error::Parameter`] for more than there are pairs; directions that are none.
     pub fn design(&self, pairs: &[Pair], count: usize) -> Result<Vec<usize>> {
         check_directions(pairs)?;
         if count > pairs.len() {

@@ -46,7 +46,7 @@ impl Nbrdf {
     /// The inputs are $\sin\theta_h$, 0, $\cos\theta_h$, $d_x$, $d_y$, $d_z$.
     ///
     /// # Errors
-    /// [`Error::Shape`](crate::Error::Shape) for another count, [`Error::NotFinite`](crate::Error::NotFinite) naming the first number
+    /// [`Error::Shape`] for another count, [`Error::NotFinite`] naming the first number
     /// that is not finite.
     pub fn new(weights: &[f32]) -> Result<Self> {
         if weights.len() != Self::FLOATS {
@@ -120,7 +120,7 @@ impl Nbrdf {
     /// BRDF in 1/sr, without the cosine: all reds, all greens, all blues.
     ///
     /// # Errors
-    /// [`Error::Shape`](crate::Error::Shape) unless `out` has three values for each pair.
+    /// [`Error::Shape`] unless `out` has three values for each pair.
     pub fn eval_into(&self, directions: &Columns<f32>, out: &mut [f32]) -> Result<()> {
         run(self, CHANNELS, directions, out)
     }
