@@ -13,7 +13,7 @@
 //! ```
 //! use elm::{Activation, ElmParams, solve::Ridge};
 //! use elm_brdf::export::{Language, source};
-//! use elm_brdf::{brdf::Fit, features::Features, geometry::pairs, link::Link, model::BrdfParams};
+//! use elm_brdf::{features::Features, geometry::pairs, link::Link, model::BrdfParams};
 //! use elm_datasets::{Invalid, MaterialId, synthetic};
 //!
 //! let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
@@ -23,9 +23,8 @@
 //!     link: Link::default_log(),
 //!     network: ElmParams::new(40).activation(Activation::Sine).solver(Ridge::leave_one_out()),
 //! };
-//! let model = params.fit(&pairs(&samples.directions), samples.values.view())?;
-//! let network = BrdfModel::of(&*model).ok_or("a formula")?;
-//! let shader = source(network, Language::Glsl, "felt")?;
+//! let model = params.fit_model(&pairs(&samples.directions), samples.values.view())?;
+//! let shader = source(&model, Language::Glsl, "felt")?;
 //! assert!(shader.contains("vec3 felt_eval(vec3 light, vec3 viewer)"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
