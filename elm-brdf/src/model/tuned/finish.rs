@@ -26,7 +26,7 @@ use crate::model::Layer;
 /// than what rounding alone leaves.
 const ROUNDING: f64 = 25.0;
 /// While the albedo is not physical they count ten times as much, so many times.
-const STEPS: usize = 4;
+const STEPS: usize = 6;
 /// Rounds of working residuals end where targets move by a two-thousandth of their size.
 const CONVERGED: f64 = 2.5e-7;
 

@@ -64,8 +64,9 @@ pub(super) fn fit(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) ->
     let mut found: Option<Finished> = None;
     for (number, setting) in settings.iter().enumerate() {
         let physical = found.as_ref().is_some_and(|found| found.excess <= 0.0);
-        let close = number < FINISHED && setting.error <= CLOSE * settings[0].error;
-        if physical && !close || number >= MOST_FINISHED {
+        let usual = setting.set == Features::SumDifference;
+        let close = usual || number < FINISHED && setting.error <= CLOSE * settings[0].error;
+        if physical && !close || number >= MOST_FINISHED && !usual {
             continue;
         }
         let finished = finished(&problem, setting, &rows)?;

@@ -11,11 +11,22 @@ use crate::link::FittedLink;
 
 /// Angles of the light in degrees at which the albedo must be physical besides the stated ones.
 const FURTHER_ANGLES: [f64; 3] = [80.0, 88.0, 89.5];
+/// Beyond this angle, where hardly anything is measured and little is seen, half more is borne.
+const GRAZING: f64 = 86.0;
+const GRAZING_ALLOWED: f64 = 1.5;
+
+/// What a viewer may see under light of 1 from everywhere, which the directional albedo of measurements
+/// that are not reciprocal to their own noise exceeds by as much.
+const SEEN: f64 = 1.03;
+
+/// How many times the albedo of the nearest measurements is physical too: a white that returns nearly all
+/// light is measured no better than that.
+const ALLOWED: f64 = 1.05;
 
 /// Where the albedo is looked at.
 pub(super) struct Survey {
-    /// For each angle of the light its nodes.
-    angles: Vec<Vec<Node>>,
+    /// For each angle of the light the albedo that is borne, and its nodes.
+    angles: Vec<(f64, Vec<Node>)>,
 }
 
 impl Survey {
@@ -23,13 +34,20 @@ impl Survey {
         let angles = albedo::ANGLES.into_iter().chain(FURTHER_ANGLES);
         Self {
             angles: angles
-                .map(|angle| albedo::nodes(angle.to_radians()))
+                .map(|angle| {
+                    let borne = if angle > GRAZING {
+                        GRAZING_ALLOWED
+                    } else {
+                        1.0
+                    };
+                    (borne, albedo::nodes(angle.to_radians()))
+                })
                 .collect(),
         }
     }
 
-    /// By how much the albedo, for light or for viewer at one of the angles, is above 1 and above what
-    /// the nearest measurements give, whose targets `nearest` says.
+    /// By how much the albedo, for light or for viewer at one of the angles, is above 1 (near the horizon
+    /// 1.5) and above a twentieth more than the nearest measurements give, whose targets `nearest` says.
     pub(super) fn excess(
         &self,
         features: Features,
@@ -43,7 +61,7 @@ impl Survey {
         } else {
             &[false, true]
         };
-        for nodes in &self.angles {
+        for (borne, nodes) in &self.angles {
             for &swapped in orders {
                 let of = |node: &Node| {
                     if swapped {
@@ -56,13 +74,14 @@ impl Survey {
                 let sums = |targets: Array2<f64>| -> Result<Vec<f64>> {
                     Ok(albedo::sums(nodes, link.to_values(targets)?.view()))
                 };
+                let borne = if swapped { borne.max(SEEN) } else { *borne };
                 let found = sums(network.predict(&features.compute(&pairs))?)?;
-                if found.iter().all(|&albedo| albedo <= 1.0) {
+                if found.iter().all(|&albedo| albedo <= borne) {
                     continue;
                 }
                 let implied = sums(nearest(&pairs))?;
                 for (found, implied) in found.into_iter().zip(implied) {
-                    excess = excess.max(found - implied.max(1.0));
+                    excess = excess.max(found - (ALLOWED * implied).max(borne));
                 }
             }
         }
