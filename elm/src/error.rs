@@ -69,6 +69,9 @@ pub enum Error {
         /// Smallest over largest singular value.
         reciprocal_condition: f64,
     },
+    /// A matrix that is to be positive definite is not, to rounding, or holds a NaN.
+    #[error("the matrix is not positive definite to rounding")]
+    NotPositiveDefinite,
     /// Two settings exclude each other.
     #[error("{first} and {second} exclude each other")]
     Conflict {

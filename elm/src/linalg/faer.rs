@@ -360,13 +360,13 @@ fn add_gram_of<A: RealField + Copy>(a: MatRef<'_, A>, sum: MatMut<'_, A>) {
     );
 }
 
-fn solve_positive<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
-    a: ArrayView2<'_, A>,
-    b: ArrayView2<'_, A>,
-) -> Result<CholeskySolve<A>, Failure> {
-    let n = a.nrows();
-    let mut factor = by_columns(a);
-    let mut x = by_columns(b);
+fn cholesky<A: RealField + Copy + Zero>(a: Array2<A>) -> Result<Array2<A>, Failure> {
+    let mut factor = if a.t().is_standard_layout() {
+        a
+    } else {
+        by_columns(a.view())
+    };
+    let n = factor.nrows();
     let scratch = llt::factor::cholesky_in_place_scratch::<A>(n, PAR, Default::default());
     llt::factor::cholesky_in_place(
         view_mut(&mut factor),
@@ -376,9 +376,33 @@ fn solve_positive<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
         Default::default(),
     )
     .map_err(|_| Failure::Pivot)?;
+    Ok(factor)
+}
+
+fn solve_lower<A: RealField + Copy + Zero>(l: &Array2<A>, b: ArrayView2<'_, A>) -> Array2<A> {
+    let mut x = by_columns(b);
+    triangular_solve::solve_lower_triangular_in_place(view(l.view()), view_mut(&mut x), PAR);
+    x
+}
+
+fn solve_lower_transposed<A: RealField + Copy + Zero>(
+    l: &Array2<A>,
+    b: ArrayView2<'_, A>,
+) -> Array2<A> {
+    let mut x = by_columns(b);
+    let upper = view(l.view()).transpose();
+    triangular_solve::solve_upper_triangular_in_place(upper, view_mut(&mut x), PAR);
+    x
+}
+
+fn solve_positive<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
+    a: ArrayView2<'_, A>,
+    b: ArrayView2<'_, A>,
+) -> Result<CholeskySolve<A>, Failure> {
+    let n = a.nrows();
+    let factor = cholesky(by_columns(a))?;
+    let x = solve_lower_transposed(&factor, solve_lower(&factor, b).view());
     let lower = view(factor.view());
-    triangular_solve::solve_lower_triangular_in_place(lower, view_mut(&mut x), PAR);
-    triangular_solve::solve_upper_triangular_in_place(lower.transpose(), view_mut(&mut x), PAR);
     // With A = L L^T the trace of the inverse is the sum of squares of L^-1.
     let mut inverse = Array2::zeros((n, n).f());
     invert_lower_triangular(view_mut(&mut inverse), lower, PAR);
@@ -458,6 +482,24 @@ macro_rules! kernel {
                 b: ArrayView2<'_, Self>,
             ) -> Result<CholeskySolve<Self>, Failure> {
                 clean(solve_positive(a, b))
+            }
+
+            fn cholesky(a: Array2<Self>) -> Result<Array2<Self>, Failure> {
+                clean(cholesky(a))
+            }
+
+            fn solve_lower(
+                l: &Array2<Self>,
+                b: ArrayView2<'_, Self>,
+            ) -> Result<Array2<Self>, Failure> {
+                Ok(clean(solve_lower(l, b)))
+            }
+
+            fn solve_lower_transposed(
+                l: &Array2<Self>,
+                b: ArrayView2<'_, Self>,
+            ) -> Result<Array2<Self>, Failure> {
+                Ok(clean(solve_lower_transposed(l, b)))
             }
         }
     )*};

@@ -91,23 +91,34 @@ fn solve_square<A: Lapack<Real = A>>(
     Ok(x)
 }
 
+fn cholesky<A: Lapack<Real = A>>(a: ArrayView2<'_, A>) -> Result<Array2<A>, Failure> {
+    by_rows(a).cholesky_into(UPLO::Lower).map_err(pivot)
+}
+
+fn solve_lower<A: Lapack<Real = A>>(
+    l: &Array2<A>,
+    b: ArrayView2<'_, A>,
+) -> Result<Array2<A>, Failure> {
+    l.solve_triangular(UPLO::Lower, Diag::NonUnit, &by_rows(b))
+        .map_err(pivot)
+}
+
+fn solve_lower_transposed<A: Lapack<Real = A>>(
+    l: &Array2<A>,
+    b: ArrayView2<'_, A>,
+) -> Result<Array2<A>, Failure> {
+    solve_upper(l.t(), b)
+}
+
 fn solve_positive<A: Lapack<Real = A>>(
     a: ArrayView2<'_, A>,
     b: ArrayView2<'_, A>,
 ) -> Result<CholeskySolve<A>, Failure> {
-    let lower: Array2<A> = by_rows(a).cholesky_into(UPLO::Lower).map_err(pivot)?;
+    let lower = cholesky(a)?;
     // With A = L L^T the trace of the inverse is the sum of squares of L^-1.
-    let inverse = lower
-        .solve_triangular(UPLO::Lower, Diag::NonUnit, &Array2::eye(a.nrows()))
-        .map_err(pivot)?;
-    let upper = lower.t().as_standard_layout().into_owned();
-    let half = lower
-        .solve_triangular(UPLO::Lower, Diag::NonUnit, &by_rows(b))
-        .map_err(pivot)?;
+    let inverse = solve_lower(&lower, Array2::eye(a.nrows()).view())?;
     Ok(CholeskySolve {
-        x: upper
-            .solve_triangular(UPLO::Upper, Diag::NonUnit, &half)
-            .map_err(pivot)?,
+        x: solve_lower_transposed(&lower, solve_lower(&lower, b)?.view())?,
         inverse_trace: inverse.iter().map(|v| v.square()).sum(),
     })
 }
@@ -165,6 +176,27 @@ macro_rules! kernel {
             ) -> Result<CholeskySolve<Self>, Failure> {
                 sequential();
                 solve_positive(a, b)
+            }
+
+            fn cholesky(a: Array2<Self>) -> Result<Array2<Self>, Failure> {
+                sequential();
+                cholesky(a.view())
+            }
+
+            fn solve_lower(
+                l: &Array2<Self>,
+                b: ArrayView2<'_, Self>,
+            ) -> Result<Array2<Self>, Failure> {
+                sequential();
+                solve_lower(l, b)
+            }
+
+            fn solve_lower_transposed(
+                l: &Array2<Self>,
+                b: ArrayView2<'_, Self>,
+            ) -> Result<Array2<Self>, Failure> {
+                sequential();
+                solve_lower_transposed(l, b)
             }
         }
     )*};

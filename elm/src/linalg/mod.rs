@@ -120,6 +120,19 @@ pub trait Backend: Sized {
         a: ArrayView2<'_, Self>,
         b: ArrayView2<'_, Self>,
     ) -> Result<CholeskySolve<Self>, Failure>;
+
+    /// The $L$ of $A = L L^T$ for symmetric positive definite $A$, of which the lower half is read. The
+    /// upper half of the result is not said.
+    fn cholesky(a: Array2<Self>) -> Result<Array2<Self>, Failure>;
+
+    /// Solves $L X = B$, of which the lower half of $L$ is read.
+    fn solve_lower(l: &Array2<Self>, b: ArrayView2<'_, Self>) -> Result<Array2<Self>, Failure>;
+
+    /// Solves $L^T X = B$, of which the lower half of $L$ is read.
+    fn solve_lower_transposed(
+        l: &Array2<Self>,
+        b: ArrayView2<'_, Self>,
+    ) -> Result<Array2<Self>, Failure>;
 }
 
 #[cfg(test)]

@@ -23,6 +23,7 @@
 //! # Ok::<(), elm::Error>(())
 //! ```
 
+mod cholesky;
 pub(crate) mod design_svd;
 mod diagnosis;
 pub(crate) mod equilibration;
@@ -53,6 +54,7 @@ use crate::scalar::Scalar;
 use design_svd::DesignSvd;
 use normal_equations::{HiddenRows, RowSource};
 
+pub use cholesky::Cholesky;
 pub use diagnosis::{Diagnosis, Reason, Route};
 pub use inverse::Inverse;
 pub use pseudo_inverse::PseudoInverse;

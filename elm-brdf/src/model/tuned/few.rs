@@ -177,7 +177,7 @@ impl<'a> Search<'a> {
                 let Some(factor) = moments.factor(strength) else {
                     continue;
                 };
-                for (most, evidence) in most.iter_mut().zip(factor.evidence(&moments)) {
+                for (most, evidence) in most.iter_mut().zip(factor.evidence(&moments)?) {
                     if evidence > most.0 {
                         *most = (evidence, strength);
                     }
@@ -226,7 +226,7 @@ impl<'a> Search<'a> {
             let link = link.select(channels);
             let targets = self.targets.select(Axis(1), channels);
             let strength = set.tried[candidate][channels[0]].1;
-            let Some(fitted) = left_out(&h, &targets, self.weights.as_ref(), strength) else {
+            let Some(fitted) = left_out(&h, &targets, self.weights.as_ref(), strength)? else {
                 continue;
             };
             let fitted = link.to_values(fitted)?;
@@ -297,7 +297,7 @@ fn left_out(
     targets: &Array2<f64>,
     weights: Option<&Array1<f64>>,
     strength: f64,
-) -> Option<Array2<f64>> {
+) -> Result<Option<Array2<f64>>> {
     let rows = h.nrows();
     let part = |rows: std::ops::Range<usize>| {
         let rows = Slice::from(rows);
@@ -314,10 +314,13 @@ fn left_out(
         let fold = fold * rows / FOLDS..(fold + 1) * rows / FOLDS;
         let mut others = all.clone();
         others.add(&part(fold.clone()), -1.0);
-        let weights = others.factor(strength)?.solve(&others);
+        let Some(factor) = others.factor(strength) else {
+            return Ok(None);
+        };
+        let weights = factor.solve(&others)?;
         let fold = Slice::from(fold);
         let mut there = fitted.slice_axis_mut(Axis(0), fold);
         there.assign(&weights.apply(h.slice_axis(Axis(0), fold)));
     }
-    Some(fitted)
+    Ok(Some(fitted))
 }

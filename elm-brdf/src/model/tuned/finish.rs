@@ -128,7 +128,7 @@ impl Problem<'_> {
         rows: &Rows,
         strength: f64,
         pull: Option<&Pull>,
-    ) -> Option<(Array2<f64>, Weights)> {
+    ) -> Result<Option<(Array2<f64>, Weights)>> {
         let mut predicted = Array2::zeros((self.judged.len(), self.targets.ncols()));
         let mut first = 0;
         let mut whole = None;
@@ -140,14 +140,17 @@ impl Problem<'_> {
             if let Some(pull) = pull {
                 left.add(&pull.without[number], pull.times);
             }
-            let weights = left.factor(strength)?.solve(&left);
+            let Some(factor) = left.factor(strength) else {
+                return Ok(None);
+            };
+            let weights = factor.solve(&left)?;
             let range = Slice::from(first..first + fold.len());
             let fitted = weights.apply(rows.judged.slice_axis(Axis(0), range));
             predicted.slice_axis_mut(Axis(0), range).assign(&fitted);
             first += fold.len();
             whole = Some(weights);
         }
-        whole.map(|weights| (predicted, weights))
+        Ok(whole.map(|weights| (predicted, weights)))
     }
 
     /// Of the strengths of these steps the one with the least error on rows left out, and what is
@@ -168,7 +171,7 @@ impl Problem<'_> {
         let mut tried: Vec<(f64, f64, Array2<f64>)> = Vec::new();
         for step in steps {
             let strength = rows.scale * WEAKEST * 10_f64.powf(step as f64 / 2.0);
-            let Some((held_out, weights)) = self.held_out(rows, strength, pull) else {
+            let Some((held_out, weights)) = self.held_out(rows, strength, pull)? else {
                 continue;
             };
             let errors = self.variances(&held_out);
@@ -235,7 +238,7 @@ impl Problem<'_> {
         let mut all = rows.total.clone();
         all.add(&pull.all, pull.times);
         let factor = all.factor(strength).ok_or_else(no_fit)?;
-        let mut weights = factor.solve(&all);
+        let mut weights = factor.solve(&all)?;
         if self.tuned.metric != Metric::Rmse {
             return Ok(weights);
         }
@@ -260,7 +263,7 @@ impl Problem<'_> {
                 pull.times,
             );
             let before = weights.apply(rows.judged.view());
-            weights = factor.solve(&moved);
+            weights = factor.solve(&moved)?;
             let after = weights.apply(rows.judged.view());
             // What the noise moves, not what the rows say.
             let moved = (&after - &before).mapv_into(|d| d * d).sum();

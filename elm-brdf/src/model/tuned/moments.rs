@@ -6,13 +6,16 @@
 //! precision can bear (see [`rounding`]) leaves enough.
 
 use ndarray::linalg::general_mat_mul;
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Slice};
+use elm::solve::Cholesky;
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, ShapeBuilder, Slice};
+
+use crate::error::Result;
 
 /// The weakest strength, relative to the sum of the columns' squares: below, the normal equations have
 /// no digits.
 pub(super) const WEAKEST: f64 = 1e-12;
-/// Rows of a block of the factorisation.
-const BLOCK: usize = 48;
+/// Columns of a block of a product of which half is needed.
+const BLOCK: usize = 96;
 
 /// Sums of products of the columns of a hidden-layer matrix, of a constant, and of the targets.
 #[derive(Debug, Clone)]
@@ -136,68 +139,55 @@ impl Moments {
     /// `None` where rounding has made them indefinite.
     pub(super) fn factor(&self, strength: f64) -> Option<Factor> {
         let neurons = self.gram.nrows() - 1;
-        let mut lower = self.gram.clone();
+        let mut shifted = self.gram.clone();
         for k in 0..neurons {
-            lower[[k, k]] += strength;
+            shifted[[k, k]] += strength;
         }
-        cholesky(&mut lower).then_some(Factor { lower, strength })
+        let triangle = Cholesky::new(shifted).ok()?;
+        Some(Factor { triangle, strength })
     }
 }
 
 /// A factorised problem.
 pub(super) struct Factor {
-    lower: Array2<f64>,
+    triangle: Cholesky<f64>,
     strength: f64,
 }
 
 impl Factor {
     /// The output weights for the targets of `moments`, whose triangle this is.
-    pub(super) fn solve(&self, moments: &Moments) -> Weights {
-        let mut x = moments.cross.clone();
-        let n = self.lower.nrows();
-        forward(&self.lower, &mut x);
-        for row in (0..n).rev() {
-            let (mut head, tail) = x.view_mut().split_at(Axis(0), row + 1);
-            let mut this = head.row_mut(row);
-            let column = self.lower.column(row);
-            this -= &column
-                .slice_axis(Axis(0), Slice::from(row + 1..))
-                .dot(&tail);
-            this /= self.lower[[row, row]];
-        }
-        let intercept = x.row(n - 1).to_owned();
-        Weights {
-            beta: x.slice_axis(Axis(0), Slice::from(..n - 1)).to_owned(),
-            intercept,
-        }
+    pub(super) fn solve(&self, moments: &Moments) -> Result<Weights> {
+        let x = self.triangle.solve(&moments.cross)?;
+        let (beta, constant) = x.view().split_at(Axis(0), x.nrows() - 1);
+        Ok(Weights {
+            beta: beta.to_owned(),
+            intercept: constant.row(0).to_owned(),
+        })
     }
 
     /// The logarithm of each output's evidence up to a constant of the rows and outputs, by the
     /// formula of
     /// [`log_evidence`](elm::validate::Validator::log_evidence).
-    pub(super) fn evidence(&self, moments: &Moments) -> Vec<f64> {
-        let n = self.lower.nrows();
-        let mut y = moments.cross.clone();
-        forward(&self.lower, &mut y);
-        let complexity: f64 = 2.0 * self.lower.diag().iter().map(|d| d.ln()).sum::<f64>()
-            - (n - 1) as f64 * self.strength.ln();
+    pub(super) fn evidence(&self, moments: &Moments) -> Result<Vec<f64>> {
+        let y = self.triangle.forward(&moments.cross)?;
+        let neurons = y.nrows() - 1;
+        let complexity = self.triangle.log_determinant() - neurons as f64 * self.strength.ln();
         let rows = moments.rows.saturating_sub(1).max(1) as f64;
         let columns = y.columns().into_iter().zip(&moments.squares);
-        columns
-            .map(|(y, squares)| {
-                let variance = ((squares - y.dot(&y)) / rows).max(squares * 1e-15);
-                -0.5 * (rows * variance.ln() + complexity)
-            })
-            .collect()
+        let evidence = columns.map(|(y, squares)| {
+            let variance = ((squares - y.dot(&y)) / rows).max(squares * 1e-15);
+            -0.5 * (rows * variance.ln() + complexity)
+        });
+        Ok(evidence.collect())
     }
 }
 
 /// The product of `left` and `right` on and below its diagonal, block by block; above it is anything.
 fn lower_product(left: ArrayView2<'_, f64>, right: ArrayView2<'_, f64>) -> Array2<f64> {
     let n = right.ncols();
-    let mut product = Array2::zeros((n, n));
-    for first in (0..n).step_by(2 * BLOCK) {
-        let columns = Slice::from(first..(first + 2 * BLOCK).min(n));
+    let mut product = Array2::zeros((n, n).f());
+    for first in (0..n).step_by(BLOCK) {
+        let columns = Slice::from(first..(first + BLOCK).min(n));
         let mut target = product.slice_axis_mut(Axis(1), columns);
         target.slice_axis_inplace(Axis(0), Slice::from(first..));
         let rows = left.slice_axis(Axis(0), Slice::from(first..));
@@ -205,64 +195,6 @@ fn lower_product(left: ArrayView2<'_, f64>, right: ArrayView2<'_, f64>) -> Array
         general_mat_mul(1.0, &rows, &columns, 0.0, &mut target);
     }
     product
-}
-
-/// Solves $L y = b$ in place of `b`.
-fn forward(lower: &Array2<f64>, b: &mut Array2<f64>) {
-    for row in 0..lower.nrows() {
-        let (head, mut tail) = b.view_mut().split_at(Axis(0), row);
-        let mut this = tail.row_mut(0);
-        this -= &lower
-            .row(row)
-            .slice_axis(Axis(0), Slice::from(..row))
-            .dot(&head);
-        this /= lower[[row, row]];
-    }
-}
-
-/// Overwrites the lower triangle of a symmetric matrix by its Cholesky factor; whether it has one.
-fn cholesky(a: &mut Array2<f64>) -> bool {
-    let n = a.nrows();
-    for first in (0..n).step_by(BLOCK) {
-        let width = BLOCK.min(n - first);
-        // What the blocks before take away of all rows from here on.
-        if first > 0 {
-            let (done, open) = a.view_mut().split_at(Axis(1), first);
-            let rows = done.slice_axis(Axis(0), Slice::from(first..));
-            let block = done.slice_axis(Axis(0), Slice::from(first..first + width));
-            let mut target = open;
-            target.slice_axis_inplace(Axis(0), Slice::from(first..));
-            target.slice_axis_inplace(Axis(1), Slice::from(..width));
-            general_mat_mul(-1.0, &rows, &block.t(), 1.0, &mut target);
-        }
-        let Some(entries) = a.as_slice_mut() else {
-            return false;
-        };
-        for row in first..n {
-            let (above, this) = entries.split_at_mut(row * n);
-            let this = &mut this[first..first + width];
-            for column in 0..width.min(row - first + 1) {
-                let (known, open) = this.split_at_mut(column);
-                let other = if first + column == row {
-                    &*known
-                } else {
-                    let start = (first + column) * n + first;
-                    &above[start..start + column]
-                };
-                let taken: f64 = known.iter().zip(other).map(|(a, b)| a * b).sum();
-                let rest = open[0] - taken;
-                open[0] = if first + column == row {
-                    if rest <= 0.0 || rest.is_nan() {
-                        return false;
-                    }
-                    rest.sqrt()
-                } else {
-                    rest / above[(first + column) * n + first + column]
-                };
-            }
-        }
-    }
-    true
 }
 
 /// How far single precision may move a prediction, as a standard deviation for each output: half an
@@ -314,7 +246,7 @@ mod tests {
                 // The same absolute strength; the library's are relative.
                 let largest = solution.diagnosis.largest_singular_value.powi(2);
                 let factor = moments.factor(relative * largest).unwrap();
-                let weights = factor.solve(&moments);
+                let weights = factor.solve(&moments).unwrap();
                 let predicted = weights.apply(h.view());
                 let expected = h.dot(&solution.beta) + &solution.intercept;
                 // Of normal equations of n columns: n epsilon times their condition, which the
@@ -323,7 +255,7 @@ mod tests {
                 let error = (neurons + 1) as f64 * f64::EPSILON / relative * size;
                 assert_abs_diff_eq!(predicted, expected, epsilon = error);
                 let evidence = validator.log_evidence(&[relative]).unwrap();
-                differences.push(factor.evidence(&moments)[1] - evidence[1]);
+                differences.push(factor.evidence(&moments).unwrap()[1] - evidence[1]);
             }
             // Up to a constant.
             assert_abs_diff_eq!(differences[0], differences[1], epsilon = 1e-5);
@@ -345,8 +277,8 @@ mod tests {
         rest.add(&part(60..90), -1.0);
         let direct = part(0..60);
         let (one, other) = (
-            rest.factor(0.1).unwrap().solve(&rest),
-            direct.factor(0.1).unwrap().solve(&direct),
+            rest.factor(0.1).unwrap().solve(&rest).unwrap(),
+            direct.factor(0.1).unwrap().solve(&direct).unwrap(),
         );
         assert_abs_diff_eq!(one.beta, other.beta, epsilon = 1e-9);
         assert_abs_diff_eq!(one.intercept, other.intercept, epsilon = 1e-9);
