@@ -5,9 +5,9 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use elm_brdf::brdf::Fit;
-use elm_brdf::geometry::pairs;
 use elm_brdf::model::{BrdfParams, ScaledOnce};
 use elm_brdf::protocol::{Folds, cross_validate};
+use elm_datasets::geometry::pairs;
 use elm_datasets::{Invalid, MaterialId, Measurements, synthetic};
 use ndarray::{Axis, concatenate};
 

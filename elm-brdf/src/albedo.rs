@@ -14,7 +14,7 @@ use ndarray::ArrayView2;
 
 use crate::brdf::Brdf;
 use crate::error::Result;
-use crate::geometry::{Pair, cartesian};
+use elm_datasets::geometry::{Pair, cartesian};
 
 /// The angles of the light, in degrees, at which a fit looks at the albedo.
 pub const ANGLES: [f64; 7] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0];
@@ -82,7 +82,7 @@ pub(crate) fn nodes(theta: f64) -> Vec<Node> {
 /// ```
 /// use elm_brdf::albedo;
 /// use elm_brdf::brdf::Brdf;
-/// use elm_brdf::geometry::Pair;
+/// use elm_datasets::geometry::Pair;
 /// use ndarray::Array2;
 ///
 /// struct Lambert(f64);

@@ -5,7 +5,7 @@ use std::any::Any;
 use ndarray::{Array2, ArrayView2, Axis};
 
 use crate::error::{Error, Result};
-use crate::geometry::Pair;
+use elm_datasets::geometry::Pair;
 
 /// A reflectance model, possibly of several channels, or of several materials side by side.
 ///

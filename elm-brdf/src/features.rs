@@ -7,7 +7,7 @@ use ndarray::{Array2, ArrayViewMut1};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::geometry::{NORMAL, Pair, Vector, dot, reflect};
+use elm_datasets::geometry::{NORMAL, Pair, Vector, dot, reflect};
 
 /// A set of network inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -282,7 +282,7 @@ impl FromStr for Features {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::cartesian;
+    use elm_datasets::geometry::cartesian;
     use proptest::prelude::*;
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, FRAC_PI_6, PI};
 

@@ -36,7 +36,6 @@ pub mod features;
 pub mod fetch;
 mod file;
 pub mod gallery;
-pub mod geometry;
 pub mod link;
 pub mod metrics;
 pub mod model;

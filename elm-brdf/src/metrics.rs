@@ -9,7 +9,7 @@ use ndarray::{Array1, ArrayView2, aview1};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::geometry::Pair;
+use elm_datasets::geometry::Pair;
 
 /// The measure that a fit makes small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -115,7 +115,8 @@ impl Metrics {
     /// [`elm::Error`] where shapes differ or there is nothing to compare.
     ///
     /// ```
-    /// use elm_brdf::{geometry::{Pair, cartesian}, metrics::Metrics};
+    /// use elm_brdf::metrics::Metrics;
+    /// use elm_datasets::geometry::{Pair, cartesian};
     /// use ndarray::array;
     ///
     /// let pair = Pair { incident: cartesian(0.3, 0.0), outgoing: cartesian(0.0, 0.0) };
@@ -285,8 +286,8 @@ fn log_distance(f: f64, g: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::cartesian;
     use approx::assert_abs_diff_eq;
+    use elm_datasets::geometry::cartesian;
     use ndarray::{Array2, array};
 
     fn seen_at(theta_o: f64) -> Pair {

@@ -33,10 +33,10 @@ use serde::{Deserialize, Serialize};
 use crate::brdf::{Brdf, Fit, check};
 use crate::error::{Error, Result};
 use crate::features::Features;
-use crate::geometry::Pair;
 use crate::link::Link;
 use crate::metrics::Metrics;
 use crate::model::{BrdfModel, Draw, Layer};
+use elm_datasets::geometry::Pair;
 
 /// How a [`Prior`] is built.
 ///
@@ -68,7 +68,8 @@ impl Default for PriorParams {
 /// A distribution of networks, learnt from materials.
 ///
 /// ```
-/// use elm_brdf::{brdf::Fit, geometry::pairs, prior::PriorParams};
+/// use elm_brdf::{brdf::Fit, prior::PriorParams};
+/// use elm_datasets::geometry::pairs;
 /// use elm_datasets::{Invalid, MaterialId, synthetic};
 /// use ndarray::{Array2, Axis};
 ///

@@ -7,12 +7,12 @@ use rand::seq::SliceRandom;
 
 use crate::brdf::{Brdf, Fit};
 use crate::error::{Error, Result};
-use crate::geometry::{self, Pair};
 use crate::metrics::{Comparison, Metrics, Truth};
 use crate::model::SideBySide;
 use crate::prior::{Prior, PriorParams};
 use crate::quality::{self, NoiseFloor};
 use crate::streams::generator;
+use elm_datasets::geometry::{self, Pair};
 
 /// Which fold each measurement is held out in: a seeded shuffle, dealt into folds whose sizes
 /// differ by at most one.

@@ -4,7 +4,7 @@
 use ndarray::ArrayView1;
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::{Pair, dot};
+use elm_datasets::geometry::{Pair, dot};
 
 /// How far cosines of exchanged directions may lie apart: far more than six printed decimals of
 /// an angle, far less than the steps between different measurements of a rig.
@@ -131,8 +131,8 @@ pub fn saturated(pairs: &[Pair], values: ArrayView1<'_, f64>) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{cartesian, pairs};
     use approx::assert_abs_diff_eq;
+    use elm_datasets::geometry::{cartesian, pairs};
     use elm_datasets::{Invalid, MaterialId, analytic, curet::rig, synthetic};
     use ndarray::{Array1, array};
 

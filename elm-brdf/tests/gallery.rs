@@ -6,9 +6,9 @@
 mod browser;
 
 use elm_brdf::gallery::{self, Exhibit, Only, sphere};
-use elm_brdf::geometry::pairs;
 use elm_brdf::model::BrdfModel;
 use elm_brdf::render::{Bitmap, Options, default_network, render};
+use elm_datasets::geometry::pairs;
 use elm_datasets::{Invalid, MaterialId, synthetic};
 
 /// Pixels across and down of what the page shows to this test.

@@ -11,11 +11,11 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use elm_brdf::geometry::{Pair, cartesian};
 use elm_brdf::render::{
     Library, Material, Options, Savings, Scene, Supply, default_network, render, scene,
 };
 use elm_datasets::curet::MATERIALS;
+use elm_datasets::geometry::{Pair, cartesian};
 use networks::library;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

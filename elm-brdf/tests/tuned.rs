@@ -14,9 +14,9 @@ use rand_chacha::ChaCha8Rng;
 use elm_brdf::albedo;
 use elm_brdf::batch::Packed;
 use elm_brdf::brdf::Brdf;
-use elm_brdf::geometry::{Pair, cartesian};
 use elm_brdf::metrics::Metric;
 use elm_brdf::model::{BrdfModel, Tuned};
+use elm_datasets::geometry::{Pair, cartesian};
 
 type Formula = fn(&Angles) -> f64;
 

@@ -41,6 +41,7 @@ pub mod csv;
 pub mod curet;
 pub mod error;
 mod file;
+pub mod geometry;
 mod material_id;
 pub mod measurements;
 pub mod merl;
@@ -54,7 +55,6 @@ pub mod scattered;
 pub mod synthetic;
 mod text;
 pub mod toy;
-mod vector;
 
 pub use error::Error;
 pub use material_id::MaterialId;

@@ -31,7 +31,7 @@ use ndarray::Array2;
 
 pub use crate::error::merl::Problem;
 use crate::error::merl::{DIMENSIONS, HEADER, LENGTH};
-use crate::vector::{Vector, cartesian, directions, half, mirror, pair};
+use crate::geometry::{Pair, Vector, cartesian, half_vector, reflect};
 use crate::{Directions, Error, Samples, Sampling, file};
 
 /// Steps of the half vector's polar angle.
@@ -188,7 +188,10 @@ impl Merl {
     #[must_use]
     pub fn eval(&self, directions: &Directions) -> [f64; 3] {
         let number = |channel: usize, index: usize| self.numbers.get(channel * CELLS + index);
-        let (light, viewer) = pair(directions);
+        let Pair {
+            incident: light,
+            outgoing: viewer,
+        } = directions.into();
         let Some(index) = index_of(light, viewer) else {
             return [f64::NAN; 3];
         };
@@ -257,14 +260,19 @@ pub fn cell(theta_h: usize, theta_d: usize, phi_d: usize) -> Option<Directions> 
     // The difference vector, in a frame along the half vector, turned into that of the surface.
     let (sin, cos) = theta_h.sin_cos();
     let light = [cos * x + sin * z, y, cos * z - sin * x];
-    let viewer = mirror(light, cartesian(theta_h, 0.0));
-    (light[2] > 0.0 && viewer[2] > 0.0).then(|| directions(light, viewer))
+    let viewer = reflect(light, cartesian(theta_h, 0.0));
+    (light[2] > 0.0 && viewer[2] > 0.0).then(|| {
+        Directions::from(&Pair {
+            incident: light,
+            outgoing: viewer,
+        })
+    })
 }
 
 /// Where a pair of directions stands in a channel; `None` without a half vector.
 #[allow(clippy::cast_precision_loss)]
 fn index_of(light: Vector, viewer: Vector) -> Option<usize> {
-    let [x, y, z] = half(light, viewer).filter(|half| half[2].is_finite())?;
+    let [x, y, z] = half_vector(light, viewer).filter(|half| half[2].is_finite())?;
     let theta_h = z.clamp(-1.0, 1.0).acos();
     let phi_h = y.atan2(x);
     // The light, turned by -phi_h about z and then by -theta_h about y.

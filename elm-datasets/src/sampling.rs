@@ -5,8 +5,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use crate::geometry::{Pair, Vector, cartesian, reflect};
 use crate::toy::MAX_ROWS;
-use crate::vector::{Vector, cartesian, directions, mirror};
 use crate::{Directions, Error};
 
 /// Cosine of the polar angles' upper limit, 85 degrees, when directions are drawn at random.
@@ -93,7 +93,10 @@ fn random(rows: usize, seed: u64) -> Vec<Directions> {
             } else {
                 near_mirror(&mut rng, light)
             };
-            directions(light, viewer)
+            Directions::from(&Pair {
+                incident: light,
+                outgoing: viewer,
+            })
         })
         .collect()
 }
@@ -108,7 +111,7 @@ fn near_mirror(rng: &mut impl Rng, light: Vector) -> Vector {
     // For half of the azimuths the tilt lifts the viewer, so that few trials are needed.
     loop {
         let tilt = rng.random_range(0.0..=LARGEST_TILT);
-        let viewer = mirror(light, cartesian(tilt, rng.random_range(-PI..PI)));
+        let viewer = reflect(light, cartesian(tilt, rng.random_range(-PI..PI)));
         if viewer[2] >= LEAST_COSINE {
             return viewer;
         }
@@ -135,7 +138,7 @@ fn grid(polar: usize, azimuth: usize) -> Vec<Directions> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vector::{dot, half, pair};
+    use crate::geometry::{dot, half_vector};
 
     fn random(rows: usize, seed: u64) -> Vec<Directions> {
         Sampling::Random { rows, seed }.directions().unwrap()
@@ -152,10 +155,13 @@ mod tests {
         let pairs = random(4000, 1);
         let mut near = 0;
         for (row, both) in pairs.iter().enumerate() {
-            let (light, viewer) = pair(both);
+            let Pair {
+                incident: light,
+                outgoing: viewer,
+            } = both.into();
             // Through the arc cosine and back costs a few units in the last place.
             assert!(light[2] >= LEAST_COSINE - 1e-15 && viewer[2] >= LEAST_COSINE - 1e-15);
-            let tilt = half(light, viewer).unwrap()[2].acos();
+            let tilt = half_vector(light, viewer).unwrap()[2].acos();
             assert!(row % 2 == 0 || tilt <= LARGEST_TILT + 1e-7, "{tilt}");
             near += usize::from(tilt <= LARGEST_TILT);
         }
@@ -192,9 +198,10 @@ mod tests {
     #[test]
     fn vectors_and_angles_are_the_same_directions() {
         for both in random(100, 5) {
-            let (light, viewer) = pair(&both);
-            let again = pair(&directions(light, viewer));
-            assert!(dot(light, again.0) > 1.0 - 1e-15 && dot(viewer, again.1) > 1.0 - 1e-15);
+            let pair = Pair::from(&both);
+            let again = Pair::from(&Directions::from(&pair));
+            assert!(dot(pair.incident, again.incident) > 1.0 - 1e-15);
+            assert!(dot(pair.outgoing, again.outgoing) > 1.0 - 1e-15);
         }
     }
 }

@@ -9,10 +9,10 @@ use std::path::PathBuf;
 use elm::solve::{PseudoInverse, Ridge, Solver};
 use elm::{Activation, ElmParams, Scaler};
 use elm_brdf::features::Features;
-use elm_brdf::geometry::pairs;
 use elm_brdf::link::Link;
 use elm_brdf::model::{BrdfParams, ScaledOnce};
 use elm_brdf::protocol::{Folds, cross_validate};
+use elm_datasets::geometry::pairs;
 use elm_datasets::{Invalid, MaterialId, Measurements, curet, synthetic};
 use ndarray::{Array2, ArrayView2, Axis, concatenate};
 

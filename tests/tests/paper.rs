@@ -8,10 +8,10 @@ use elm::ElmParams;
 use elm::solve::{Inverse, PseudoInverse};
 use elm_brdf::brdf::Fit;
 use elm_brdf::features::Features;
-use elm_brdf::geometry::{Pair, pairs};
 use elm_brdf::link::Link;
 use elm_brdf::model::BrdfParams;
 use elm_brdf::protocol::{Folds, cross_validate};
+use elm_datasets::geometry::{Pair, pairs};
 use elm_datasets::{Invalid, MaterialId, Measurements, synthetic};
 use ndarray::{Axis, s};
 

@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 
 use elm_brdf::albedo;
 use elm_brdf::brdf::{Brdf, Fit};
-use elm_brdf::geometry::pairs;
 use elm_brdf::model::Tuned;
 use elm_brdf::reference;
+use elm_datasets::geometry::pairs;
 use elm_datasets::{Invalid, MaterialId, OpenOptions, Samples, curet, open, paint, synthetic};
 
 /// Rows of a synthetic paint: few, and many.

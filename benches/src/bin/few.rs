@@ -10,10 +10,10 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use elm_brdf::brdf::Fit;
-use elm_brdf::geometry::{Pair, pairs};
 use elm_brdf::model::Tuned;
 use elm_brdf::prior::{Prior, PriorParams};
 use elm_brdf::protocol::Folds;
+use elm_datasets::geometry::{Pair, pairs};
 use elm_datasets::{Invalid, MaterialId, curet};
 use ndarray::{Array2, Axis};
 use rand::SeedableRng;

@@ -6,7 +6,7 @@ use ndarray::Array2;
 use super::real::Real;
 use super::{Block, Columns, ROWS};
 use crate::features::Features;
-use crate::geometry::Pair;
+use elm_datasets::geometry::Pair;
 
 /// Fills a block for each input of the set. The same as
 /// [`Features::compute`](crate::features::Features::compute) but for rounding.

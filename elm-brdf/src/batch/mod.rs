@@ -13,7 +13,8 @@
 //!
 //! ```
 //! use elm_brdf::batch::{Columns, Packed};
-//! use elm_brdf::{brdf::Brdf, geometry::pairs, model::Tuned};
+//! use elm_brdf::{brdf::Brdf, model::Tuned};
+//! use elm_datasets::geometry::pairs;
 //! use elm_datasets::{Invalid, MaterialId, synthetic};
 //!
 //! let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
@@ -40,8 +41,8 @@ use ndarray::Array2;
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::error::{Error, Result};
-use crate::geometry::Pair;
 pub(crate) use dense::Dense;
+use elm_datasets::geometry::Pair;
 pub(crate) use inputs::inputs_of;
 pub use packed::Packed;
 pub use real::Real;

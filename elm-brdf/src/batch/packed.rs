@@ -10,9 +10,9 @@ use super::{Batched, Block, Columns, Kernel, ROWS, eval_pairs, inputs, run};
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};
 use crate::features::Features;
-use crate::geometry::Pair;
 use crate::link::Channel;
 use crate::model::BrdfModel;
+use elm_datasets::geometry::Pair;
 
 /// A [`BrdfModel`] packed for [evaluation by columns](crate::batch) in `f32` or `f64`.
 ///

@@ -3,11 +3,11 @@
 use super::*;
 use crate::brdf::Brdf;
 use crate::features::Features;
-use crate::geometry::cartesian;
 use crate::link::Link;
 use crate::model::{BrdfModel, BrdfParams};
 use elm::solve::Ridge;
 use elm::{Activation, ElmParams, Kind};
+use elm_datasets::geometry::cartesian;
 use ndarray::Axis;
 
 /// Directions all over the hemisphere, coincident and mirror ones among them.

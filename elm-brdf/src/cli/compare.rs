@@ -12,11 +12,11 @@ use super::data::Source;
 use super::samples::{Material, Reading};
 use super::{Failure, models, overwrite, print};
 use crate::brdf::Fit;
-use crate::geometry::{Pair, pairs};
 use crate::protocol::{Folds, MaterialScores, cross_validate, cross_validate_samples};
 use crate::reference::Reference;
 use crate::report::plot::{self, Shown};
 use crate::report::{Comparison, Data, Entry, Format, Words};
+use elm_datasets::geometry::{Pair, pairs};
 
 /// Cross-validate every model on the same folds: analytic models, the database's own basis,
 /// interpolators, Gaussian processes, and extreme learning machines.

@@ -11,9 +11,9 @@ use super::{Failure, print};
 use crate::brdf::Brdf;
 use crate::error::Error;
 use crate::file;
-use crate::geometry::pairs;
 use crate::metrics::Metrics;
 use crate::model::BrdfModel;
+use elm_datasets::geometry::pairs;
 
 /// Judge a saved model by measurements.
 #[derive(Debug, Args)]

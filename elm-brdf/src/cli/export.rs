@@ -10,9 +10,9 @@ use super::{Failure, overwrite, say};
 use crate::error::Error;
 use crate::export::{ExportError, Format, Language, header, merl_table, source};
 use crate::file;
-use crate::geometry::pairs;
 use crate::model::BrdfModel;
 use crate::render::{Supply, default_network, scene};
+use elm_datasets::geometry::pairs;
 
 /// Write a model as source code or as a table, for other programs.
 ///

@@ -12,11 +12,11 @@ use crate::albedo;
 use crate::error::Error;
 use crate::features::Features;
 use crate::file;
-use crate::geometry::pairs;
 use crate::metrics::Metric;
 use crate::model::{BrdfModel, Tuned};
 use crate::prior::Prior;
 use crate::quality;
+use elm_datasets::geometry::pairs;
 
 /// Fit a network to measurements and save it as one file.
 ///

@@ -11,10 +11,10 @@ use super::{Failure, overwrite, print};
 use crate::error::Error;
 use crate::export::ExportError;
 use crate::gallery::{self, Exhibit};
-use crate::geometry::pairs;
 use crate::model::BrdfModel;
 use crate::protocol::{Folds, cross_validate};
 use crate::render::default_network;
+use elm_datasets::geometry::pairs;
 
 /// Write a page that shows learnt materials: spheres, lobes, errors, sizes, and a sphere to play
 /// with, shaded by the networks in the browser.

@@ -11,12 +11,12 @@ use super::samples::Reading;
 use super::{Failure, overwrite, print};
 use crate::error::Error;
 use crate::file;
-use crate::geometry::pairs;
 use crate::metrics::Metric;
 use crate::pareto::{self, Given, Point, Problem};
 use crate::protocol::Folds;
 use crate::reference::Nbrdf;
 use crate::report::plot;
+use elm_datasets::geometry::pairs;
 
 /// Weigh run time against error: for every model that can be fitted, the held-out error, the time to
 /// fit, the time of an evaluation, and the numbers stored; and which models no other beats.

@@ -11,8 +11,8 @@ use super::common::{hint, usage};
 use super::data::Source;
 use super::{Failure, overwrite, print};
 use crate::error::Error;
-use crate::geometry::pairs;
 use crate::prior::PriorParams;
+use elm_datasets::geometry::pairs;
 
 /// What other materials teach about a new one.
 #[derive(Debug, Args)]

@@ -13,7 +13,8 @@
 //! ```
 //! use elm::{Activation, ElmParams, solve::Ridge};
 //! use elm_brdf::export::{Language, source};
-//! use elm_brdf::{features::Features, geometry::pairs, link::Link, model::BrdfParams};
+//! use elm_brdf::{features::Features, link::Link, model::BrdfParams};
+//! use elm_datasets::geometry::pairs;
 //! use elm_datasets::{Invalid, MaterialId, synthetic};
 //!
 //! let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
@@ -50,8 +51,8 @@ pub use write::{header, source};
 
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};
-use crate::geometry::{Pair, pairs};
 use crate::model::BrdfModel;
+use elm_datasets::geometry::{Pair, pairs};
 
 /// What a model can be exported to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -9,8 +9,8 @@ use super::network::{Network, Neuron};
 use crate::batch;
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};
-use crate::geometry::{Pair, pairs};
 use crate::model::BrdfModel;
+use elm_datasets::geometry::{Pair, pairs};
 
 /// The error of evaluating a model in `f32` in place of `f64`, over directions all over the
 /// hemisphere, near the mirror direction and back towards the light. In 1/sr, over all channels.

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use crate::brdf::Brdf;
 use crate::error::Result;
-use crate::geometry::{Pair, cartesian};
+use elm_datasets::geometry::{Pair, cartesian};
 
 /// Angles of the light in degrees, with the colour of each lobe.
 const LIGHTS: [(f64, &str); 3] = [(10.0, "#7fb4d8"), (40.0, "#e6a857"), (70.0, "#d97a7a")];

@@ -5,8 +5,8 @@ use ndarray::{Array2, ArrayView2};
 use super::BrdfParams;
 use crate::brdf::{Brdf, Fit};
 use crate::error::{Error, Result};
-use crate::geometry::Pair;
 use crate::link::Link;
+use elm_datasets::geometry::Pair;
 
 /// [`BrdfParams`] that are cross-validated with their inputs standardised once, on all
 /// measurements, so that all folds come from one factorisation, in closed form.

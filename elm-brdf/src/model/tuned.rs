@@ -19,9 +19,9 @@ use super::{BrdfModel, Draw, Provenance};
 use crate::brdf::{Brdf, Fit, check};
 use crate::error::{Error, Result};
 use crate::features::Features;
-use crate::geometry::Pair;
 use crate::metrics::Metric;
 use crate::quality;
+use elm_datasets::geometry::Pair;
 use finish::Finished;
 pub use lean::Lean;
 use problem::Problem;
@@ -69,7 +69,8 @@ use problem::Problem;
 /// for all channels.
 ///
 /// ```
-/// use elm_brdf::{brdf::Brdf, geometry::pairs, model::Tuned};
+/// use elm_brdf::{brdf::Brdf, model::Tuned};
+/// use elm_datasets::geometry::pairs;
 /// use elm_datasets::{Invalid, MaterialId, synthetic};
 ///
 /// let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);

@@ -5,10 +5,10 @@ use ndarray::ArrayView2;
 
 use crate::brdf::{Brdf, Fit};
 use crate::error::Result;
-use crate::geometry::Pair;
 use crate::metrics::Metric;
 use crate::model::{BrdfParams, Lean, Tuned};
 use crate::reference;
+use elm_datasets::geometry::Pair;
 
 /// A way to fit a model, with its name.
 pub struct Candidate {

@@ -7,8 +7,8 @@ use std::time::Instant;
 use crate::batch::{Batched, Columns, Packed, Precision, Real};
 use crate::brdf::Brdf;
 use crate::error::Result;
-use crate::geometry::Pair;
 use crate::reference::Nbrdf;
+use elm_datasets::geometry::Pair;
 
 /// Pairs in a batch: its directions and values stay in the second-level cache.
 const BATCH: usize = 4096;

@@ -21,9 +21,9 @@ pub use candidates::{Candidate, all};
 use crate::batch::Packed;
 use crate::brdf::Brdf;
 use crate::error::Result;
-use crate::geometry::Pair;
 use crate::metrics::{Metric, Metrics};
 use crate::model::BrdfModel;
+use elm_datasets::geometry::Pair;
 
 /// Measurements to fit to, and others of the same material that judge.
 #[derive(Debug, Clone)]

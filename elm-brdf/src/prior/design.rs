@@ -5,7 +5,7 @@ use ndarray::{Array1, Axis, Zip};
 use super::Prior;
 use crate::brdf::check_directions;
 use crate::error::{Error, Result};
-use crate::geometry::Pair;
+use elm_datasets::geometry::Pair;
 
 /// The variance that no measurement explains, relative to the prior's mean variance.
 const NOISE: f64 = 0.01;
@@ -24,7 +24,8 @@ impl Prior {
     /// 10(3), 1995 (A-optimality, by a greedy choice).
     ///
     /// ```
-    /// use elm_brdf::{geometry::pairs, prior::PriorParams};
+    /// use elm_brdf::prior::PriorParams;
+    /// use elm_datasets::geometry::pairs;
     /// use elm_datasets::{Invalid, MaterialId, synthetic};
     /// use ndarray::Array2;
     ///
@@ -96,8 +97,8 @@ mod tests {
     use elm_datasets::{Invalid, MaterialId, synthetic};
     use ndarray::Array2;
 
-    use crate::geometry::pairs;
     use crate::prior::PriorParams;
+    use elm_datasets::geometry::pairs;
 
     #[test]
     fn a_design_repeats_no_direction_and_begins_like_a_shorter_one() {

@@ -7,9 +7,9 @@ use super::kernel::{Projected, Weights, check_rows};
 use crate::brdf::{Brdf, Fit};
 use crate::error::{Error, Result};
 use crate::features::Features;
-use crate::geometry::Pair;
 use crate::link::Link;
 use crate::scales::spread;
+use elm_datasets::geometry::Pair;
 
 /// Correlation of the process at a distance $r$ in units of the length scales.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

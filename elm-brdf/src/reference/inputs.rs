@@ -6,8 +6,8 @@ use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
 use crate::brdf::{check, check_directions};
 use crate::error::Result;
 use crate::features::Features;
-use crate::geometry::Pair;
 use crate::link::{FittedLink, Link};
+use elm_datasets::geometry::Pair;
 
 /// From directions to points in a space where distance means something, and from predicted
 /// targets to reflectance.

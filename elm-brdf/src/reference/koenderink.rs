@@ -7,7 +7,7 @@ use ndarray::{Array2, ArrayView2};
 
 use crate::brdf::{Brdf, Fit, check, check_directions};
 use crate::error::Result;
-use crate::geometry::Pair;
+use elm_datasets::geometry::Pair;
 
 /// A linear combination of the isotropic and reciprocal functions that Zernike's polynomials
 /// $R_n^l$ give on pairs of hemispheres,
@@ -141,9 +141,9 @@ impl Brdf for Fitted {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::cartesian;
     use approx::assert_abs_diff_eq;
     use elm::solve::PseudoInverse;
+    use elm_datasets::geometry::cartesian;
 
     #[test]
     fn orders_have_the_published_numbers_of_coefficients() {

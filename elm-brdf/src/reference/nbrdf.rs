@@ -9,7 +9,7 @@ use pulp::Simd;
 use crate::batch::{Batched, Block, Columns, Dense, Kernel, ROWS, Real, eval_pairs, run};
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};
-use crate::geometry::Pair;
+use elm_datasets::geometry::Pair;
 
 /// Neurons of each of its two hidden layers.
 const NEURONS: usize = 21;

@@ -6,8 +6,8 @@ use super::inputs::{Frame, squared_distances};
 use crate::brdf::{Brdf, Fit};
 use crate::error::{Error, Result};
 use crate::features::Features;
-use crate::geometry::Pair;
 use crate::link::Link;
+use elm_datasets::geometry::Pair;
 
 /// The mean of the targets at the nearest nodes, each weighted by $r^{-p}$ of its distance $r$
 /// over standardised inputs; at a node itself its own target.

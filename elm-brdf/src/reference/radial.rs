@@ -7,8 +7,8 @@ use super::kernel::{Projected, Weights, check_rows};
 use crate::brdf::{Brdf, Fit};
 use crate::error::Result;
 use crate::features::Features;
-use crate::geometry::Pair;
 use crate::link::Link;
+use elm_datasets::geometry::Pair;
 
 /// A radial basis function of the distance $r$.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

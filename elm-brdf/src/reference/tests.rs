@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::error::Error;
-use crate::geometry::{Pair, cartesian};
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use elm_datasets::analytic::{self, Angles};
+use elm_datasets::geometry::{Pair, cartesian};
 use ndarray::{Array2, Axis, array};
 use std::f64::consts::{FRAC_PI_4, PI};
 

@@ -5,8 +5,8 @@ use rand::seq::index;
 
 use crate::brdf::{Brdf, Fit};
 use crate::error::Result;
-use crate::geometry::Pair;
 use crate::streams::{self, generator};
+use elm_datasets::geometry::Pair;
 
 /// A method that is fitted to a random subset where there are more measurements than it can
 /// afford: dense kernel matrices grow with the square of the rows, their decompositions with the
@@ -36,9 +36,9 @@ impl Fit for Thinned {
 mod tests {
     use super::*;
     use crate::features::Features;
-    use crate::geometry::cartesian;
     use crate::link::Link;
     use crate::reference::Neighbours;
+    use elm_datasets::geometry::cartesian;
     use ndarray::Array2;
 
     #[test]

@@ -6,7 +6,7 @@ use super::account::{Reason, Savings, Tally};
 use super::shelf::Shelf;
 use super::vector::{BLACK, Rgb};
 use crate::error::Result;
-use crate::geometry::Pair;
+use elm_datasets::geometry::Pair;
 
 /// One evaluation that a path waits for.
 #[derive(Debug, Clone, Copy)]

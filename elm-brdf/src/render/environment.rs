@@ -6,7 +6,7 @@ use std::path::Path;
 use super::distribution::Distribution2;
 use super::error::SceneError;
 use super::vector::{Frame, Rgb, Vec3, largest, luminance, scaled, times};
-use crate::geometry::Vector;
+use elm_datasets::geometry::Vector;
 
 /// Most pixels of a picture of the environment.
 const MAX_PIXELS: u64 = 1 << 25;

@@ -6,7 +6,7 @@ use super::proxy::{Proxy, Survey};
 use super::vector::{Rgb, largest, luminance, scaled, times};
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};
-use crate::geometry::{Pair, Vector};
+use elm_datasets::geometry::{Pair, Vector};
 
 /// A model may pass the largest value of its [`Survey`] by this factor; beyond, it is cut off.
 const CEILING_MARGIN: f64 = 2.0;
@@ -18,7 +18,7 @@ const CEILING_MARGIN: f64 = 2.0;
 /// the renderer leave out what cannot be seen.
 ///
 /// ```
-/// use elm_brdf::geometry::{Pair, cartesian};
+/// use elm_datasets::geometry::{Pair, cartesian};
 /// use elm_brdf::render::{Analytic, Material};
 /// let chalk = Material::new(Box::new(Analytic::lambert(0.8)), [1.0; 3], false)?;
 /// let outgoing = cartesian(0.5, 0.0);

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::distribution::Distribution2;
-use crate::geometry::{Pair, Vector, cartesian};
+use elm_datasets::geometry::{Pair, Vector, cartesian};
 
 /// Viewing angles of the table.
 const VIEWS: usize = 16;

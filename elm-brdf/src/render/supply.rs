@@ -14,10 +14,10 @@ use super::scene;
 use crate::brdf::{Brdf, Fit};
 use crate::error::{Error, Result};
 use crate::features::Features;
-use crate::geometry::{Pair, pairs};
 use crate::link::Link;
 use crate::model::{BrdfModel, BrdfParams};
 use crate::reference;
+use elm_datasets::geometry::{Pair, pairs};
 
 /// A model and where it comes from, in a word: "CUReT", "stand-in", a file's name, "analytic".
 pub struct Supplied {

@@ -11,7 +11,7 @@ use super::shelf::Shelf;
 use super::vector::{BLACK, Frame, Rgb, Vec3, add, largest, scaled, times};
 use super::world::{Hit, World};
 use crate::error::Result;
-use crate::geometry::{Pair, Vector};
+use elm_datasets::geometry::{Pair, Vector};
 
 /// Surfaces after which dim paths may end by chance.
 const ROULETTE_FROM: u32 = 3;

@@ -1,6 +1,6 @@
 //! Points and directions in the world, and the frame of a surface.
 
-use crate::geometry::Vector;
+use elm_datasets::geometry::Vector;
 
 /// A point, direction or colour of the world.
 pub(crate) type Vec3 = nalgebra::Vector3<f64>;
@@ -86,7 +86,7 @@ mod tests {
         fn a_frame_is_orthonormal_and_goes_there_and_back(
             theta in 0.0..std::f64::consts::PI, phi in -3.2..3.2_f64,
         ) {
-            let n = Vec3::from(crate::geometry::cartesian(theta, phi));
+            let n = Vec3::from(elm_datasets::geometry::cartesian(theta, phi));
             let frame = Frame::about(n);
             prop_assert!((frame.tangent.cross(&frame.bitangent) - n).norm() < 1e-14);
             let w = Vec3::new(0.3, -0.5, 0.8).normalize();

@@ -45,7 +45,7 @@ use std::path::Path;
 use ndarray::Array2;
 
 pub use crate::error::rgl::Problem;
-use crate::vector::{half, pair, polar};
+use crate::geometry::{Pair, half_vector, polar};
 use crate::{Directions, Error, Samples, Sampling, file};
 use tensor::{F32, Field, U8};
 use warp::{Axis, Size, Warp};
@@ -197,8 +197,12 @@ impl Rgl {
     #[must_use]
     pub fn eval(&self, directions: &Directions) -> Vec<f64> {
         let mut values = vec![0.0; self.channels.count()];
-        let (light, viewer) = pair(directions);
-        let Some(normal) = half(light, viewer).filter(|_| light[2] > 0.0 && viewer[2] > 0.0) else {
+        let Pair {
+            incident: light,
+            outgoing: viewer,
+        } = directions.into();
+        let Some(normal) = half_vector(light, viewer).filter(|_| light[2] > 0.0 && viewer[2] > 0.0)
+        else {
             return values;
         };
         let ((theta_i, phi_i), (theta_m, phi_m)) = (polar(light), polar(normal));

@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use super::Note;
 use crate::Directions;
 use crate::error::scattered::{ANGLES, AngleUnit, Problem};
-use crate::vector::{Vector, directions, dot};
+use crate::geometry::{Pair, Vector, dot};
 
 /// How far from 1 the length of a direction may be: numbers with three decimals are each up to
 /// 0.0005 off, so the length up to `sqrt(3) * 0.0005`.
@@ -112,7 +112,10 @@ impl Reader {
         };
         let light = check("wi", [ix, iy, iz])??;
         Ok(match check("wo", [ox, oy, oz])? {
-            Ok(viewer) => Found::Reflected(directions(light, viewer)),
+            Ok(viewer) => Found::Reflected(Directions::from(&Pair {
+                incident: light,
+                outgoing: viewer,
+            })),
             Err(problem) => Found::Transmitted(problem),
         })
     }

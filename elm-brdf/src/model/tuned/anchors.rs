@@ -18,8 +18,8 @@ use rand::Rng;
 use rand::seq::index;
 use rand_chacha::ChaCha8Rng;
 
-use crate::geometry::{NORMAL, Pair, cartesian, dot};
 use crate::streams::{self, generator};
+use elm_datasets::geometry::{NORMAL, Pair, cartesian, dot};
 
 /// Anchors laid over the hemisphere, and further ones for light and viewer near the horizon, where
 /// measurements end and a highlight's extrapolation grows fastest.

@@ -3,9 +3,9 @@
 use ndarray::{Array1, ArrayView1, ArrayView2};
 
 use crate::error::Error;
-use crate::geometry::Pair;
 use crate::link::FittedLink;
 use crate::metrics::Metric;
+use elm_datasets::geometry::Pair;
 
 /// Of the errors the largest are cut off at this quantile, lest a few rows decide.
 const QUANTILE: f64 = 0.99;

@@ -13,11 +13,11 @@ use super::problem::Problem;
 use super::{Drawn, NOISY, Tuned, better, model_of};
 use crate::error::{Error, Result};
 use crate::features::Features;
-use crate::geometry::Pair;
 use crate::link::{FittedLink, Link};
 use crate::model::BrdfModel;
 use crate::scales::spread;
 use crate::streams::{self, generator};
+use elm_datasets::geometry::Pair;
 
 /// Most neurons, unless they are asked for.
 const NEURONS: usize = 400;

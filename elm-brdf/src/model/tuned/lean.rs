@@ -12,11 +12,11 @@ use super::{Drawn, provenance};
 use crate::brdf::{Brdf, Fit, check};
 use crate::error::{Error, Result};
 use crate::features::Features;
-use crate::geometry::Pair;
 use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
 use crate::model::{BrdfModel, Layer};
 use crate::streams::{self, generator};
+use elm_datasets::geometry::Pair;
 
 /// A network of so many neurons of one function, made for cheap [evaluation](crate::batch).
 ///
@@ -38,7 +38,8 @@ use crate::streams::{self, generator};
 /// few (up to 1500).
 ///
 /// ```
-/// use elm_brdf::{batch::Packed, geometry::pairs, model::Lean};
+/// use elm_brdf::{batch::Packed, model::Lean};
+/// use elm_datasets::geometry::pairs;
 /// use elm_datasets::{Invalid, MaterialId, synthetic};
 ///
 /// let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);

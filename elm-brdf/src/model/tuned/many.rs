@@ -12,11 +12,11 @@ use super::problem::Problem;
 use super::{Drawn, NOISY, TIE, Tuned, better, model_of};
 use crate::error::{Error, Result};
 use crate::features::Features;
-use crate::geometry::Pair;
 use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
 use crate::model::BrdfModel;
 use crate::streams::{self, generator};
+use elm_datasets::geometry::Pair;
 
 /// Neurons unless said otherwise: some 675 numbers for three channels.
 pub(super) const NEURONS: usize = 213;

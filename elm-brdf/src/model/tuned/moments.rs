@@ -5,8 +5,8 @@
 //! normal equations lose half of the digits, which for the strengths that a model evaluated in single
 //! precision can bear (see [`rounding`]) leaves enough.
 
-use ndarray::linalg::general_mat_mul;
 use elm::solve::Cholesky;
+use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, ShapeBuilder, Slice};
 
 use crate::error::Result;

@@ -7,9 +7,9 @@ use super::Tuned;
 use super::anchors::{Anchors, Neighbourhood};
 use super::errors::row_weights;
 use crate::error::Result;
-use crate::geometry::Pair;
 use crate::link::FittedLink;
 use crate::streams::{self, generator};
+use elm_datasets::geometry::Pair;
 
 /// Folds of the cross-validation.
 const FOLDS: usize = 5;

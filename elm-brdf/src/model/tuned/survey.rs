@@ -6,8 +6,8 @@ use ndarray::Array2;
 use crate::albedo::{self, Node};
 use crate::error::Result;
 use crate::features::Features;
-use crate::geometry::Pair;
 use crate::link::FittedLink;
+use elm_datasets::geometry::Pair;
 
 /// Angles of the light in degrees at which the albedo must be physical besides the stated ones.
 const FURTHER_ANGLES: [f64; 3] = [80.0, 88.0, 89.5];

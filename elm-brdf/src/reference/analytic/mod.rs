@@ -13,13 +13,13 @@ use search::Problem;
 
 use crate::brdf::{Brdf, Fit, check, check_directions};
 use crate::error::Result;
-use crate::geometry::Pair;
+use elm_datasets::geometry::Pair;
 
 /// Analytic models with the parameters found for each channel.
 ///
 /// ```
 /// use elm_brdf::brdf::Brdf;
-/// use elm_brdf::geometry::{Pair, cartesian};
+/// use elm_datasets::geometry::{Pair, cartesian};
 /// use elm_brdf::reference::Analytic;
 /// use ndarray::Array2;
 ///

@@ -4,7 +4,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::{BLUE, Chart, Drawn, GREEN, GREY, PALE, Shown, VERMILION, titled};
-use crate::geometry::Pair;
+use elm_datasets::geometry::Pair;
 
 /// Width of a bin in degrees.
 const WIDTH: f64 = 10.0;

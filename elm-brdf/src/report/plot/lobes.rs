@@ -8,7 +8,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::{BLUE, Chart, Drawn, GREEN, GREY, PALE, Panel, VERMILION, round_step, titled};
 use crate::error::Result;
-use crate::geometry::{Pair, cartesian};
+use elm_datasets::geometry::{Pair, cartesian};
 
 /// Angles of the light that are drawn, in degrees.
 const LIGHTS: [(f64, RGBColor); 3] = [(22.5, BLUE), (45.0, GREEN), (67.5, VERMILION)];

@@ -34,9 +34,9 @@ use plotters::style::{FontStyle, register_font};
 use super::{mean, paper, replace};
 use crate::brdf::{Brdf, Fit};
 use crate::error::{Error, Result};
-use crate::geometry::{self, Pair};
 use crate::pareto::Point;
 use crate::protocol::MaterialScores;
+use elm_datasets::geometry::{self, Pair};
 
 pub(super) const BLUE: RGBColor = RGBColor(0, 114, 178);
 pub(super) const ORANGE: RGBColor = RGBColor(230, 159, 0);

@@ -1,6 +1,6 @@
 //! Directions as vectors. The surface lies in the plane $z = 0$ with its normal along $+z$.
 
-use elm_datasets::Directions;
+use crate::samples::Directions;
 
 /// A vector in the frame of the surface.
 pub type Vector = [f64; 3];
@@ -11,7 +11,7 @@ pub const NORMAL: Vector = [0.0, 0.0, 1.0];
 /// Equation 12: the unit vector at angle `theta` from the normal and azimuth `phi`, in radians.
 ///
 /// ```
-/// use elm_brdf::geometry::{cartesian, dot, NORMAL};
+/// use elm_datasets::geometry::{cartesian, dot, NORMAL};
 /// let l = cartesian(60_f64.to_radians(), 0.0);
 /// assert!((dot(l, NORMAL) - 0.5).abs() < 1e-15);
 /// ```
@@ -20,6 +20,13 @@ pub fn cartesian(theta: f64, phi: f64) -> Vector {
     let (sin_theta, cos_theta) = theta.sin_cos();
     let (sin_phi, cos_phi) = phi.sin_cos();
     [cos_phi * sin_theta, sin_phi * sin_theta, cos_theta]
+}
+
+/// Polar angle and azimuth of a vector of any length but zero; as precise near the normal, where the arc
+/// cosine is not, as elsewhere.
+#[must_use]
+pub fn polar([x, y, z]: Vector) -> (f64, f64) {
+    (x.hypot(y).atan2(z), y.atan2(x))
 }
 
 /// Scalar product.
@@ -99,7 +106,7 @@ impl Pair {
 /// $\theta_h$ is taken as 0.
 ///
 /// ```
-/// use elm_brdf::geometry::{Pair, cartesian};
+/// use elm_datasets::geometry::{Pair, cartesian};
 /// let pair = Pair { incident: cartesian(0.2, 0.0), outgoing: cartesian(1.0, 0.0) };
 /// let angles = pair.half_difference();
 /// assert!((angles.theta_h() - 0.6).abs() < 1e-15);
@@ -163,6 +170,18 @@ impl From<&Directions> for Pair {
         Self {
             incident: cartesian(directions.theta_i, directions.phi_i),
             outgoing: cartesian(directions.theta_o, directions.phi_o),
+        }
+    }
+}
+
+impl From<&Pair> for Directions {
+    fn from(pair: &Pair) -> Self {
+        let ((theta_i, phi_i), (theta_o, phi_o)) = (polar(pair.incident), polar(pair.outgoing));
+        Self {
+            theta_i,
+            phi_i,
+            theta_o,
+            phi_o,
         }
     }
 }
