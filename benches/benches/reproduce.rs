@@ -4,8 +4,8 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use elm_brdf::brdf::Fit;
-use elm_brdf::model::{BrdfParams, ScaledOnce};
+use elm_brdf::fit::Fit;
+use elm_brdf::model::{BrdfModel, BrdfParams, ScaledOnce};
 use elm_brdf::protocol::{Folds, cross_validate};
 use elm_datasets::geometry::pairs;
 use elm_datasets::{Invalid, MaterialId, Measurements, synthetic};
@@ -55,7 +55,7 @@ fn reproduce(criterion: &mut Criterion) {
             return;
         };
         let plain = BrdfParams::paper(50);
-        let method: &dyn Fit = if once { &scaled } else { &plain };
+        let method: &dyn Fit<Model = BrdfModel> = if once { &scaled } else { &plain };
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
                 let fits = method.cross_fits(&pairs, values.view(), &labels, 10, &mut |_| {});

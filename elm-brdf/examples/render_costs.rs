@@ -14,18 +14,14 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use elm_brdf::render::{
-    BUILTIN_NAMES, Bitmap, Library, Options, Rendering, Savings, Scene, Sheet, builtin,
-    default_network,
-};
+use elm_brdf::render::{Bitmap, Options, Rendering, Savings};
+use elm_brdf::scene_materials::{Library, Scene, Sheet};
+use elm_brdf::scenes::{NAMES, builtin};
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 fn main() -> Outcome<()> {
-    let library = Library {
-        curet: std::env::args_os().nth(1).map(PathBuf::from),
-        network: Box::new(default_network),
-    };
+    let library = Library::new(std::env::args_os().nth(1).map(PathBuf::from));
     growth(&library)?;
     savings(&library, None)?;
     savings(&library, Some((320, 180)))
@@ -114,7 +110,7 @@ fn threads(library: &Library) -> Outcome<()> {
 fn savings(library: &Library, size: Option<(u32, u32)>) -> Outcome<()> {
     println!("\nscene               size  evaluations     time  mean steps  most steps  lossless");
     let (mut evaluations, mut times, mut count) = (0.0, 0.0, 0.0);
-    for name in BUILTIN_NAMES {
+    for name in NAMES {
         let mut sheet = builtin(name, None)?;
         if let Some((width, height)) = size {
             sheet.resize(width, height);

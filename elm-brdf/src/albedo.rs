@@ -12,8 +12,8 @@ use std::f64::consts::PI;
 
 use ndarray::ArrayView2;
 
-use crate::brdf::Brdf;
 use crate::error::Result;
+use elm_datasets::Brdf;
 use elm_datasets::geometry::{Pair, cartesian};
 
 /// The angles of the light, in degrees, at which a fit looks at the albedo.
@@ -81,23 +81,10 @@ pub(crate) fn nodes(theta: f64) -> Vec<Node> {
 ///
 /// ```
 /// use elm_brdf::albedo;
-/// use elm_brdf::brdf::Brdf;
-/// use elm_datasets::geometry::Pair;
-/// use ndarray::Array2;
+/// use elm_datasets::lobes::Formula;
 ///
-/// struct Lambert(f64);
-/// impl Brdf for Lambert {
-///     fn channels(&self) -> usize {
-///         1
-///     }
-///     fn eval(&self, pairs: &[Pair]) -> elm_brdf::Result<Array2<f64>> {
-///         Ok(Array2::from_elem((pairs.len(), 1), self.0 / std::f64::consts::PI))
-///     }
-///     fn floats_per_channel(&self) -> usize {
-///         1
-///     }
-/// }
-/// assert!((albedo::directional(&Lambert(0.5), 0.7)?[0] - 0.5).abs() < 2e-3);
+/// let chalk = Formula::lambert(0.5)?;
+/// assert!((albedo::directional(&chalk, 0.7)?[0] - 0.5).abs() < 2e-3);
 /// # Ok::<(), elm_brdf::Error>(())
 /// ```
 ///
@@ -123,25 +110,27 @@ pub(crate) fn sums(nodes: &[Node], values: ArrayView2<'_, f64>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use elm_datasets::analytic::Angles;
-    use ndarray::Array2;
+    use elm_datasets::brdf::EvalError;
+    use elm_datasets::lobes::Cosines;
+    use ndarray::ArrayViewMut2;
 
-    struct Formula(fn(&Angles) -> f64);
+    struct Formula(fn(&Cosines) -> f64);
 
     impl Brdf for Formula {
         fn channels(&self) -> usize {
             1
         }
 
-        fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
-            Ok(Array2::from_shape_fn((pairs.len(), 1), |(row, _)| {
-                let Pair { incident, outgoing } = pairs[row];
-                Angles::of_vectors(incident, outgoing).map_or(0.0, |angles| self.0(&angles))
-            }))
-        }
-
-        fn floats_per_channel(&self) -> usize {
-            0
+        fn eval_into(
+            &self,
+            pairs: &[Pair],
+            mut values: ArrayViewMut2<'_, f64>,
+        ) -> Result<(), EvalError> {
+            for (value, pair) in values.iter_mut().zip(pairs) {
+                let cosines = Cosines::of_vectors(pair.incident, pair.outgoing);
+                *value = cosines.map_or(0.0, |cosines| self.0(&cosines));
+            }
+            Ok(())
         }
     }
 
@@ -165,7 +154,7 @@ mod tests {
 
     #[test]
     fn wide_and_narrow_lobes_have_the_albedo_of_a_finer_rule() {
-        let lobes: [fn(&Angles) -> f64; 5] = [
+        let lobes: [fn(&Cosines) -> f64; 5] = [
             |_| 1.0 / PI,
             |angles| angles.ggx(0.5),
             |angles| angles.ggx(0.1),

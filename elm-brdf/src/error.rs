@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use elm_datasets::brdf::EvalError;
 use thiserror::Error;
 
 /// Result of everything in this crate that can fail.
@@ -71,6 +72,12 @@ pub enum Error {
         /// Which.
         what: &'static str,
     },
+    /// A reflectance could not be evaluated.
+    #[error(transparent)]
+    Arguments(#[from] elm_datasets::brdf::ArgumentError),
+    /// A reflectance of another crate could not be evaluated.
+    #[error(transparent)]
+    Evaluation(EvalError),
     /// A model's file could not be written or read.
     #[error(transparent)]
     File(#[from] elm::persist::Error),
@@ -91,7 +98,7 @@ pub enum Error {
     Export(#[from] crate::export::error::ExportError),
     /// A scene could not be read or rendered.
     #[error(transparent)]
-    Scene(#[from] crate::render::error::SceneError),
+    Scene(#[from] elm_brdf_render::Error),
     /// So many folds are impossible.
     #[error("{folds} folds of {rows} measurements: expected 2 to {rows} folds")]
     Folds {
@@ -111,20 +118,8 @@ pub enum Error {
         most: usize,
     },
     /// A material of a scene that names no source, or several.
-    #[error("expected exactly one of curet, csv, model and analytic")]
+    #[error("expected exactly one of curet, csv, model, table and analytic")]
     MaterialSource,
-    /// A parameter of a formula out of its range.
-    #[error("{what} is {value}, expected {least} to {most}")]
-    AnalyticValue {
-        /// The parameter.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-        /// The least it may be.
-        least: f64,
-        /// The most it may be.
-        most: f64,
-    },
     /// A model with a number of channels that is no colour.
     #[error("a model of {channels} channels cannot be rendered: expected 1 or 3")]
     Channels {
@@ -166,4 +161,19 @@ pub enum Error {
         /// The names there are.
         expected: String,
     },
+}
+
+impl From<EvalError> for Error {
+    fn from(error: EvalError) -> Self {
+        match error.downcast() {
+            Ok(own) => own,
+            Err(other) => Self::Evaluation(other),
+        }
+    }
+}
+
+impl From<Error> for EvalError {
+    fn from(error: Error) -> Self {
+        Self::new(error)
+    }
 }

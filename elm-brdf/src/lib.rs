@@ -27,7 +27,6 @@
 
 pub mod albedo;
 pub mod batch;
-pub mod brdf;
 pub mod cli;
 mod error;
 pub mod export;
@@ -35,6 +34,7 @@ pub mod features;
 #[cfg(feature = "fetch")]
 pub mod fetch;
 mod file;
+pub mod fit;
 pub mod gallery;
 pub mod link;
 pub mod metrics;
@@ -44,10 +44,14 @@ pub mod prior;
 pub mod protocol;
 pub mod published;
 pub mod quality;
+pub mod recipes;
 pub mod reference;
-pub mod render;
 pub mod report;
 mod scales;
+pub mod scene_materials;
+pub mod scenes;
 mod streams;
 
+/// The renderer.
+pub use elm_brdf_render as render;
 pub use error::{Error, Result};

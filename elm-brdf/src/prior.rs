@@ -30,9 +30,9 @@ use elm::{
 use ndarray::{Array1, Array2, ArrayView2, Axis, concatenate};
 use serde::{Deserialize, Serialize};
 
-use crate::brdf::{Brdf, Fit, check};
 use crate::error::{Error, Result};
 use crate::features::Features;
+use crate::fit::{Fit, check};
 use crate::link::Link;
 use crate::metrics::Metrics;
 use crate::model::{BrdfModel, Draw, Layer};
@@ -335,9 +335,11 @@ impl Prior {
 }
 
 impl Fit for Prior {
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+    type Model = BrdfModel;
+
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         // Each channel has strengths of its own, so that one network serves them.
-        Ok(Box::new(self.fit_judged(pairs, values, None)?))
+        self.fit_judged(pairs, values, None)
     }
 }
 

@@ -5,8 +5,8 @@ use elm_datasets::{Directions, Material, MaterialId, Measurements, Samples};
 use ndarray::{Array2, ArrayView2, Axis, Slice, concatenate};
 use rand::seq::SliceRandom;
 
-use crate::brdf::{Brdf, Fit};
 use crate::error::{Error, Result};
+use crate::fit::Fit;
 use crate::metrics::{Comparison, Metrics, Truth};
 use crate::model::SideBySide;
 use crate::prior::{Prior, PriorParams};
@@ -107,7 +107,7 @@ pub struct MaterialScores {
 /// Those of the method; [`Error::Folds`] when `folds` was made for another number of
 /// measurements.
 pub fn cross_validate(
-    method: &dyn Fit,
+    method: &(impl Fit + ?Sized),
     data: &Measurements,
     folds: &Folds,
     mut done: impl FnMut(usize, usize),
@@ -145,7 +145,7 @@ pub fn cross_validate(
 /// # Errors
 /// As for [`cross_validate`].
 pub fn cross_validate_samples(
-    method: &dyn Fit,
+    method: &(impl Fit + ?Sized),
     name: &str,
     samples: &Samples,
     folds: &Folds,
@@ -219,14 +219,16 @@ pub fn cross_validate_pooled(
 struct ByChannel(Vec<Prior>);
 
 impl Fit for ByChannel {
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+    type Model = SideBySide;
+
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         let columns = values.axis_chunks_iter(Axis(1), 1);
         let models = self
             .0
             .iter()
             .zip(columns)
             .map(|(prior, column)| prior.fit_judged(pairs, column, None));
-        Ok(Box::new(SideBySide(models.collect::<Result<_>>()?)))
+        Ok(SideBySide(models.collect::<Result<_>>()?))
     }
 }
 
@@ -279,7 +281,7 @@ impl<'a> Group<'a> {
     /// The held-out prediction of each value, and the scores of each column.
     fn cross_validate(
         &self,
-        method: &dyn Fit,
+        method: &(impl Fit + ?Sized),
         folds: &Folds,
         mut done: impl FnMut(usize),
     ) -> Result<(Array2<f64>, Vec<Scores>)> {

@@ -133,7 +133,8 @@ mod tests {
     use super::*;
     use approx::assert_abs_diff_eq;
     use elm_datasets::geometry::{cartesian, pairs};
-    use elm_datasets::{Invalid, MaterialId, analytic, curet::rig, synthetic};
+    use elm_datasets::lobes;
+    use elm_datasets::{Invalid, MaterialId, curet::rig, synthetic};
     use ndarray::{Array1, array};
 
     fn pair(theta_i: f64, theta_o: f64, phi: f64) -> Pair {
@@ -213,7 +214,7 @@ mod tests {
     fn cut_at(share: f64) -> Vec<usize> {
         let directions = rig::directions();
         let pairs = pairs(&directions);
-        let glossy = |d| analytic::lambert(d, 0.2) + analytic::ward(d, 0.1, 0.3);
+        let glossy = |d| lobes::lambert(d, 0.2) + lobes::ward(d, 0.1, 0.3);
         let exact: Array1<f64> = directions.iter().map(glossy).collect();
         let radiance = |row: usize| exact[row] * pairs[row].incident[2];
         let largest = (0..exact.len()).map(radiance).fold(0.0, f64::max);

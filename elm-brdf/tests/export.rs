@@ -15,15 +15,18 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use elm::{Activation, Biases, ElmParams, Group, Neurons, solve::Ridge};
-use elm_brdf::brdf::{Brdf, Fit};
 use elm_brdf::export::{ExportError, Format, Language, merl, source};
 use elm_brdf::features::Features;
+use elm_brdf::fit::Fit;
 use elm_brdf::link::Link;
 use elm_brdf::model::{BrdfModel, BrdfParams};
-use elm_brdf::render::default_network;
+use elm_brdf::recipes;
+use elm_datasets::Brdf;
+use elm_datasets::brdf::EvalError;
 use elm_datasets::geometry::{Pair, cartesian, pairs};
 use elm_datasets::merl::{Merl, cell};
 use elm_datasets::{Invalid, MaterialId, Samples, synthetic};
+use ndarray::ArrayViewMut2;
 use ndarray::s;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -90,13 +93,14 @@ fn models() -> Vec<(String, Box<dyn Brdf>)> {
         .enumerate()
         .map(|(index, (params, channels))| {
             let values = samples.values.slice(s![.., ..channels]);
-            (format!("m{index}"), params.fit(&pairs, values).unwrap())
+            let model: Box<dyn Brdf> = Box::new(params.fit(&pairs, values).unwrap());
+            (format!("m{index}"), model)
         })
         .collect();
-    let usual = default_network(205, None);
+    let usual = recipes::network(None);
     models.push((
         "usual".to_owned(),
-        usual.fit(&pairs, samples.values.view()).unwrap(),
+        Box::new(usual.fit(&pairs, samples.values.view()).unwrap()),
     ));
     models
 }
@@ -553,13 +557,15 @@ impl Brdf for Grey {
         1
     }
 
-    fn eval(&self, pairs: &[Pair]) -> elm_brdf::Result<ndarray::Array2<f64>> {
-        let value = |(row, _): (usize, usize)| pairs[row].incident[2] - 0.5;
-        Ok(ndarray::Array2::from_shape_fn((pairs.len(), 1), value))
-    }
-
-    fn floats_per_channel(&self) -> usize {
-        0
+    fn eval_into(
+        &self,
+        pairs: &[Pair],
+        mut values: ArrayViewMut2<'_, f64>,
+    ) -> Result<(), EvalError> {
+        for (value, pair) in values.iter_mut().zip(pairs) {
+            *value = pair.incident[2] - 0.5;
+        }
+        Ok(())
     }
 }
 
@@ -577,7 +583,7 @@ fn merl_tables_hold_the_models_values_at_the_middle_of_every_cell() {
             };
             let pair = Pair::from(&directions);
             let value = model.eval(&[pair, pair.swapped()]).unwrap();
-            let found = table.eval(&directions);
+            let found = table.at(&directions);
             for c in 0..3 {
                 // Both are one cell.
                 let of = |row: usize| value[[row, c.min(value.ncols() - 1)]].max(0.0);
@@ -608,17 +614,17 @@ fn what_cannot_be_exported_is_an_error_of_its_own() {
         9,
         Activation::custom("softsign", |z: f64| z / (1.0 + z.abs())),
     ));
-    let error = source(BrdfModel::of(&*custom).unwrap(), Language::C, "m").unwrap_err();
+    let error = source(&custom, Language::C, "m").unwrap_err();
     assert_eq!(error.to_string(), "cannot export the activation 'softsign'");
     let huge = model(network(9, Activation::Sine).scale(1e300).standardise(false));
-    let error = source(BrdfModel::of(&*huge).unwrap(), Language::C, "m").unwrap_err();
+    let error = source(&huge, Language::C, "m").unwrap_err();
     assert!(
         matches!(error, elm_brdf::Error::Export(ExportError::Single { .. })),
         "{error}"
     );
     let good = model(network(9, Activation::Sine));
     for name in ["", "1a", "a b", "_a", "a__b", "a_", "gl_a", "ä"] {
-        let error = source(BrdfModel::of(&*good).unwrap(), Language::C, name).unwrap_err();
+        let error = source(&good, Language::C, name).unwrap_err();
         assert!(
             matches!(error, elm_brdf::Error::Export(ExportError::Name { .. })),
             "{error}"

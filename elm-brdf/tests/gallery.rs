@@ -7,7 +7,8 @@ mod browser;
 
 use elm_brdf::gallery::{self, Exhibit, Only, sphere};
 use elm_brdf::model::BrdfModel;
-use elm_brdf::render::{Bitmap, Options, default_network, render};
+use elm_brdf::recipes;
+use elm_brdf::render::{Bitmap, Options, render};
 use elm_datasets::geometry::pairs;
 use elm_datasets::{Invalid, MaterialId, synthetic};
 
@@ -21,7 +22,7 @@ fn exhibits() -> Vec<Exhibit> {
             let id = MaterialId::new(id).unwrap();
             let data = synthetic::measurements(1, &[id], Invalid::Clamp);
             let samples = data.samples(0).unwrap();
-            let brdf = default_network(205, None)
+            let brdf = recipes::network(None)
                 .fit(&pairs(&samples.directions), samples.values.view())
                 .unwrap();
             Exhibit {

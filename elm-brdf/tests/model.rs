@@ -12,11 +12,11 @@ use ndarray::{Array2, s};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use elm_brdf::brdf::Brdf;
 use elm_brdf::features::Features;
 use elm_brdf::link::Link;
 use elm_brdf::metrics::{Metric, Metrics};
 use elm_brdf::model::{BrdfModel, BrdfParams, Tuned};
+use elm_datasets::Brdf;
 use elm_datasets::geometry::{self, Pair, cartesian};
 
 /// Directions of every kind: anywhere above the surface, grazing, coincident, mirrored.

@@ -7,9 +7,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use elm_brdf::brdf::Brdf;
 use elm_brdf::metrics::Metrics;
 use elm_brdf::reference::Nbrdf;
+use elm_datasets::Brdf;
 use elm_datasets::geometry::{Pair, cartesian, pairs};
 use elm_datasets::{OpenOptions, open};
 

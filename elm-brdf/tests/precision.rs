@@ -5,12 +5,12 @@
 use elm::solve::Ridge;
 use elm::{Activation, ElmParams};
 use elm_brdf::batch::Packed;
-use elm_brdf::brdf::Brdf;
 use elm_brdf::export::{ExportError, Language, source};
 use elm_brdf::features::Features;
 use elm_brdf::link::Link;
 use elm_brdf::metrics::Metrics;
 use elm_brdf::model::{BrdfModel, BrdfParams};
+use elm_datasets::Brdf;
 use elm_datasets::geometry::{Pair, cartesian, pairs};
 use elm_datasets::{Invalid, MaterialId, synthetic};
 use ndarray::array;

@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used)]
 
 use elm::persist;
-use elm_brdf::brdf::Brdf;
 use elm_brdf::metrics::Metrics;
 use elm_brdf::model::Tuned;
 use elm_brdf::prior::{Prior, PriorParams};
+use elm_datasets::Brdf;
 use elm_datasets::geometry::{self, Pair};
 use elm_datasets::{Invalid, MaterialId, synthetic};
 use ndarray::{Array2, Axis, concatenate, s};

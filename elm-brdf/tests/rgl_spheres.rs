@@ -6,7 +6,8 @@
 
 use std::path::{Path, PathBuf};
 
-use elm_brdf::render::{Library, Options, Scene, default_network, render};
+use elm_brdf::render::{Options, render};
+use elm_brdf::scene_materials::{Library, Scene};
 
 /// Luminance of linear sRGB.
 fn luminance(pixel: &[f64; 3]) -> f64 {
@@ -73,10 +74,7 @@ irradiance = [1, 1, 1]
 "
     );
     let scene = Scene::parse(&text, &data.join("scene.toml")).unwrap();
-    let library = Library {
-        curet: None,
-        network: Box::new(default_network),
-    };
+    let library = Library::new(None);
     render(&scene, &library, Options::default(), &|_, _| {})
         .unwrap()
         .pixels

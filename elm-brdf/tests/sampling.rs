@@ -11,9 +11,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use elm_brdf::render::{
-    Library, Material, Options, Savings, Scene, Supply, default_network, render, scene,
-};
+use elm_brdf::render::{Material, MaterialLoader, Options, Savings, render};
+use elm_brdf::scene_materials::{Library, MaterialTable, Scene};
 use elm_datasets::curet::MATERIALS;
 use elm_datasets::geometry::{Pair, cartesian};
 use networks::library;
@@ -22,18 +21,15 @@ use rand_chacha::ChaCha8Rng;
 
 /// Models of all 61 materials of CUReT's files, or of the stand-in, with their numbers.
 fn fitted(curet: Option<&Path>) -> Vec<(usize, Material)> {
-    let library = Library {
-        curet: curet.map(PathBuf::from),
-        network: Box::new(default_network),
-    };
+    let library = Library::new(curet.map(PathBuf::from));
     (1..=MATERIALS)
         .map(|id| {
-            let asked = scene::Material {
+            let asked = MaterialTable {
                 curet: Some(format!("{id}")),
-                ..scene::Material::default()
+                ..MaterialTable::default()
             };
-            let supplied = library.supply(&asked, Path::new("")).unwrap();
-            let material = Material::new(supplied.brdf, [1.0; 3], false).unwrap();
+            let loaded = library.load(&asked, Path::new("")).unwrap();
+            let material = Material::new(loaded.brdf, [1.0; 3], false).unwrap();
             (id, material)
         })
         .collect()
@@ -226,12 +222,12 @@ material = 'm'
     };
     let library = library(None);
     let picture = render(&scene, &library, options, &|_, _| {}).unwrap();
-    let asked = scene::Material {
+    let asked = MaterialTable {
         curet: Some("7".to_owned()),
-        ..scene::Material::default()
+        ..MaterialTable::default()
     };
-    let supplied = library.supply(&asked, Path::new("")).unwrap();
-    let material = Material::new(supplied.brdf, [1.0; 3], false).unwrap();
+    let loaded = library.load(&asked, Path::new("")).unwrap();
+    let material = Material::new(loaded.brdf, [1.0; 3], false).unwrap();
     // The pixel beside the middle sees the sphere at 1/16 to 2/16 of its radius on both axes.
     let near_normal = material.albedo()[1].1;
     let pixel = picture.pixels[8 * 16 + 8];

@@ -6,36 +6,36 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use elm_datasets::analytic::Angles;
+use elm_datasets::lobes::Cosines;
 use ndarray::{Array2, s};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use elm_brdf::albedo;
 use elm_brdf::batch::Packed;
-use elm_brdf::brdf::Brdf;
 use elm_brdf::metrics::Metric;
 use elm_brdf::model::{BrdfModel, Tuned};
+use elm_datasets::Brdf;
 use elm_datasets::geometry::{Pair, cartesian};
 
-type Formula = fn(&Angles) -> f64;
+type Formula = fn(&Cosines) -> f64;
 
 /// A plastic: diffuse under a dielectric's lobe.
-fn plastic(angles: &Angles) -> f64 {
+fn plastic(angles: &Cosines) -> f64 {
     0.25 / PI + angles.ggx(0.2) * (0.05 + 0.95 * angles.schlick())
 }
 
-fn metal(angles: &Angles) -> f64 {
+fn metal(angles: &Cosines) -> f64 {
     angles.ggx(0.17) * (0.85 + 0.15 * angles.schlick())
 }
 
 /// Glass beads: a narrow lobe back to the light.
-fn retroreflector(angles: &Angles) -> f64 {
+fn retroreflector(angles: &Cosines) -> f64 {
     0.1 / PI + 40.0 * angles.lafortune(PI / 4.0, 250.0)
 }
 
 fn value(formula: Formula, pair: &Pair) -> f64 {
-    Angles::of_vectors(pair.incident, pair.outgoing).map_or(0.0, |angles| formula(&angles))
+    Cosines::of_vectors(pair.incident, pair.outgoing).map_or(0.0, |angles| formula(&angles))
 }
 
 /// Light to 60 degrees in steps of 15, viewer to 80 in steps of 8, azimuths in steps of 18.

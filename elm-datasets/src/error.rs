@@ -47,6 +47,18 @@ pub enum Error {
         /// What the operating system said.
         reason: std::io::Error,
     },
+    /// A parameter of a [formula](crate::lobes::Formula) out of its range.
+    #[error("{what} is {value}, expected {least} to {most}")]
+    LobeParameter {
+        /// The parameter.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// The least it may be.
+        least: f64,
+        /// The most it may be.
+        most: f64,
+    },
     /// A file too large to be what it should be.
     #[error(
         "{}: expected at most {} bytes, found {found}",

@@ -2,7 +2,7 @@
 //!
 //! - [`curet`] reads and writes the CUReT database: 61 materials at 205 pairs of directions. The
 //!   database itself is not part of the crate.
-//! - [`synthetic`] makes a set of the same shape from formulas, the [`analytic`] models. Both give
+//! - [`synthetic`] makes a set of the same shape from formulas, the models of [`lobes`]. Both give
 //!   [`Measurements`], so that whatever works on one works on the other.
 //! - [`paint`] is a single synthetic material, as glossy as materials get.
 //! - [`open()`] reads [`Samples`] of one material from a file of any format: one's own as CSV
@@ -35,13 +35,14 @@
 
 #![forbid(unsafe_code)]
 
-pub mod analytic;
+pub mod brdf;
 pub mod channel;
 pub mod csv;
 pub mod curet;
 pub mod error;
 mod file;
 pub mod geometry;
+pub mod lobes;
 mod material_id;
 pub mod measurements;
 pub mod merl;
@@ -56,6 +57,7 @@ pub mod synthetic;
 mod text;
 pub mod toy;
 
+pub use brdf::Brdf;
 pub use error::Error;
 pub use material_id::MaterialId;
 pub use measurements::{Invalid, Material, Measurements, Origin, fill_values};

@@ -27,8 +27,9 @@ use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
 
-use ndarray::Array2;
+use ndarray::{Array2, ArrayViewMut2};
 
+use crate::brdf::{Brdf, EvalError, check_arguments};
 pub use crate::error::merl::Problem;
 use crate::error::merl::{DIMENSIONS, HEADER, LENGTH};
 use crate::geometry::{Pair, Vector, cartesian, half_vector, reflect};
@@ -52,13 +53,13 @@ const NOTHING: f64 = -1.0;
 /// A MERL table. It holds 35 MB.
 ///
 /// ```
-/// use elm_datasets::{Directions, analytic, merl::Merl};
+/// use elm_datasets::{Directions, lobes, merl::Merl};
 /// let red_plastic = Merl::from_fn(|d| {
-///     let gloss = analytic::ggx(d, 0.04, 0.2);
+///     let gloss = lobes::ggx(d, 0.04, 0.2);
 ///     [0.2 + gloss, gloss, gloss]
 /// });
 /// let head_on = Directions { theta_i: 0.0, phi_i: 0.0, theta_o: 0.0, phi_o: 0.0 };
-/// let [red, green, blue] = red_plastic.eval(&head_on);
+/// let [red, green, blue] = red_plastic.at(&head_on);
 /// assert!((red - 0.2 - green).abs() < 1e-12 && green == blue);
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -186,7 +187,7 @@ impl Merl {
     /// Negative where there is no measurement and below the horizon; NaN for a direction that is
     /// not finite, and for opposite directions, which have no half vector.
     #[must_use]
-    pub fn eval(&self, directions: &Directions) -> [f64; 3] {
+    pub fn at(&self, directions: impl Into<Pair>) -> [f64; 3] {
         let number = |channel: usize, index: usize| self.numbers.get(channel * CELLS + index);
         let Pair {
             incident: light,
@@ -220,7 +221,7 @@ impl Merl {
         let all = pairs.len();
         let mut numbers = Vec::with_capacity(3 * all);
         pairs.retain(|directions| {
-            let values = self.eval(directions);
+            let values = self.at(directions);
             let valid = values.iter().all(|&v| v >= 0.0 && v.is_finite());
             if valid {
                 numbers.extend(values);
@@ -238,6 +239,28 @@ impl Merl {
             channels: CHANNELS.map(str::to_owned).to_vec(),
         };
         Ok((samples, all - rows))
+    }
+}
+
+/// Entries that hold no measurement are black.
+impl Brdf for Merl {
+    fn channels(&self) -> usize {
+        3
+    }
+
+    fn eval_into(
+        &self,
+        pairs: &[Pair],
+        mut values: ArrayViewMut2<'_, f64>,
+    ) -> Result<(), EvalError> {
+        check_arguments(pairs, &values, 3)?;
+        for (mut row, pair) in values.rows_mut().into_iter().zip(pairs) {
+            for (to, value) in row.iter_mut().zip(self.at(*pair)) {
+                // NaN, too, becomes 0.
+                *to = value.max(0.0);
+            }
+        }
+        Ok(())
     }
 }
 

@@ -3,7 +3,7 @@
 //!
 //! Layers as car paint has them, in red, green and blue:
 //!
-//! - a clear coat: a narrow [Ward](crate::analytic::ward) lobe with a dielectric's reflectance,
+//! - a clear coat: a narrow [Ward](crate::lobes::ward) lobe with a dielectric's reflectance,
 //!   the same in every channel;
 //! - metal flakes under it: a wide, tinted lobe of the same kind;
 //! - a base that is all but black, which is all that is left far from the mirror direction.
@@ -19,7 +19,7 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-use crate::analytic::Angles;
+use crate::lobes::Cosines;
 use crate::{Directions, Error, Samples, Sampling};
 
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
@@ -42,7 +42,7 @@ const NOISE: f64 = 0.02;
 /// or viewer is below the horizon.
 #[must_use]
 pub fn truth(directions: &Directions) -> [f64; 3] {
-    let Some(angles) = Angles::of(directions) else {
+    let Some(angles) = Cosines::of(directions) else {
         return [0.0; 3];
     };
     let fresnel = COAT_F0 + (1.0 - COAT_F0) * angles.schlick();

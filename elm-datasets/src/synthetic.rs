@@ -2,7 +2,7 @@
 //!
 //! It has CUReT's shape (61 materials, the [rig's](crate::curet::rig) 205 pairs of directions,
 //! red, green and blue, values in steps of 0.001) and noise like CUReT's, but materials of its
-//! own, made of the [analytic](crate::analytic) models:
+//! own, made of the [analytic](crate::lobes) models:
 //!
 //! | numbers | names | made of |
 //! |---|---|---|
@@ -22,8 +22,8 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-use crate::analytic::{ggx, oren_nayar, ward};
 use crate::curet::{MaterialId, rig};
+use crate::lobes::{ggx, oren_nayar, ward};
 use crate::measurements::{Invalid, Material, Measurements, Origin};
 use crate::{Directions, Error};
 

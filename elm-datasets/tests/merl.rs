@@ -10,7 +10,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use elm_datasets::merl::{Merl, Problem, cell};
-use elm_datasets::{Directions, Error, Sampling, analytic};
+use elm_datasets::{Directions, Error, Sampling, lobes};
 use proptest::prelude::*;
 
 const CELLS: usize = 90 * 90 * 180;
@@ -88,12 +88,12 @@ fn directions_fall_into_the_cells_that_the_publication_says() {
         }
         let [h, d, phi] = real.map(|x| x as usize);
         let place = ((h * 90 + d) * 180 + phi) as f64;
-        let [red, green, blue] = table.eval(&pair);
+        let [red, green, blue] = table.at(&pair);
         for (value, per_unit) in [(red, 1.0), (green, 1.15), (blue, 1.66)] {
             assert!((value * 1500.0 / per_unit - place).abs() < 1e-6, "{pair:?}");
         }
         // Light and viewer exchanged: phi_d turns by pi, the same entry.
-        assert_eq!(table.eval(&pair.swapped()), [red, green, blue]);
+        assert_eq!(table.at(&pair.swapped()), [red, green, blue]);
         seen += 1;
     }
     assert!(seen > 3900);
@@ -121,7 +121,7 @@ fn cells_in_the_plane_of_incidence_are_those_worked_out_by_hand() {
             theta_o: b.to_radians(),
             phi_o: PI,
         };
-        let [red, ..] = table.eval(&pair);
+        let [red, ..] = table.at(&pair);
         assert_eq!(
             ((red * 1500.0).round() / 180.0).floor(),
             f64::from(row),
@@ -131,7 +131,7 @@ fn cells_in_the_plane_of_incidence_are_those_worked_out_by_hand() {
 }
 
 fn ggx(d: &Directions) -> [f64; 3] {
-    let gloss = analytic::ggx(d, 0.05, 0.3);
+    let gloss = lobes::ggx(d, 0.05, 0.3);
     [gloss, gloss + 0.1, gloss + 0.2]
 }
 
@@ -143,7 +143,7 @@ fn a_tabulated_model_has_its_own_value_in_the_middle_of_each_cell_and_none_below
         match cell(index / 16_200, index / 180 % 90, index % 180) {
             // Every seventh, for the time it takes.
             Some(pair) if index % 7 == 0 => {
-                for (found, expected) in table.eval(&pair).into_iter().zip(ggx(&pair)) {
+                for (found, expected) in table.at(&pair).into_iter().zip(ggx(&pair)) {
                     // Division and multiplication by the scale.
                     assert!((found - expected).abs() <= 1e-14 * expected, "{index}");
                 }
@@ -193,7 +193,7 @@ fn directions_without_a_cell_are_not_numbers_and_no_reason_to_panic() {
             theta_o: 0.2,
             phi_o,
         };
-        assert!(table.eval(&pair).iter().all(|value| value.is_nan()));
+        assert!(table.at(&pair).iter().all(|value| value.is_nan()));
     }
     let below = Directions {
         theta_i: 3.0,
@@ -201,7 +201,7 @@ fn directions_without_a_cell_are_not_numbers_and_no_reason_to_panic() {
         theta_o: 3.0,
         phi_o: 1.0,
     };
-    assert!(table.eval(&below).iter().all(|&value| value < 0.0));
+    assert!(table.at(&below).iter().all(|&value| value < 0.0));
 }
 
 /// A file of this length that begins with these bytes; the rest is a hole.
@@ -268,7 +268,7 @@ proptest! {
         match Merl::read(&path) {
             Ok(table) => {
                 let pair = Directions { theta_i: 0.1, phi_i: 0.0, theta_o: 0.1, phi_o: 2.0 };
-                let _ = table.eval(&pair);
+                let _ = table.at(&pair);
                 prop_assert!(table.invalid() <= 3 * CELLS);
             }
             Err(Error::Merl { problem: Problem::Length { found }, .. }) => prop_assert_eq!(found, length),
@@ -279,7 +279,7 @@ proptest! {
     #[test]
     fn any_direction_has_a_value(angles in prop::array::uniform4(any::<f64>())) {
         let [theta_i, phi_i, theta_o, phi_o] = angles;
-        let _ = EMPTY.with(|table| table.eval(&Directions { theta_i, phi_i, theta_o, phi_o }));
+        let _ = EMPTY.with(|table| table.at(&Directions { theta_i, phi_i, theta_o, phi_o }));
     }
 }
 

@@ -86,7 +86,7 @@ fn tables_that_are_exact_give_the_value_on_paper() {
     for (values, jacobian) in [("rgb", 1), ("rgb", 0), ("spectra", 1)] {
         let rgl = Rgl::from_bytes(&file(&on_paper(values, jacobian))).unwrap();
         for pair in random(2000) {
-            for (channel, found) in rgl.eval(&pair).into_iter().enumerate() {
+            for (channel, found) in rgl.at(&pair).into_iter().enumerate() {
                 let expected = expected(&pair, channel, jacobian == 1);
                 // A few dozen roundings; the square root near the normal turns 1e-16 in theta_m
                 // into up to 1e-8 in x only for theta_m below 1e-16.
@@ -108,7 +108,7 @@ fn the_authors_renderer_gives_the_same_values() {
         assert_eq!(rgl.channels().names(), theirs.channels);
         assert_eq!(theirs.values.nrows(), 200);
         for (pair, values) in theirs.directions.iter().zip(theirs.values.rows()) {
-            for (found, &expected) in rgl.eval(pair).into_iter().zip(values) {
+            for (found, &expected) in rgl.at(pair).into_iter().zip(values) {
                 // The renderer calculates in 32 bits, 6e-8 for each of some hundred operations,
                 // and divides by cosines down to 0.05.
                 let error = (found / expected - 1.0).abs();
@@ -128,7 +128,7 @@ fn turning_light_and_viewer_together_changes_nothing() {
             phi_o: pair.phi_o + turn,
             ..pair
         };
-        for (a, b) in rgl.eval(&pair).into_iter().zip(rgl.eval(&turned)) {
+        for (a, b) in rgl.at(&pair).into_iter().zip(rgl.at(&turned)) {
             // Azimuths up to 20 lose 4e-15.
             assert!((a - b).abs() < 1e-12 * a);
         }
@@ -158,7 +158,7 @@ fn errors(coarse: usize) -> (f64, f64) {
         let (cos_i, cos_o) = (pair.theta_i.cos(), pair.theta_o.cos());
         let cos_m = (cos_i + cos_o) / (2.0 + 2.0 * cos_between).sqrt();
         let exact = ggx.brdf(cos_i, cos_o, cos_m.min(1.0).acos());
-        for (found, facet) in rgl.eval(&pair).into_iter().zip(ggx.facet) {
+        for (found, facet) in rgl.at(&pair).into_iter().zip(ggx.facet) {
             let error = (found / (facet * exact) - 1.0).abs();
             worst = worst.max(error);
             sum += error;
@@ -189,7 +189,7 @@ fn there_is_no_reflection_at_or_below_the_horizon() {
             theta_o,
             phi_o: 1.0,
         };
-        assert_eq!(rgl.eval(&pair), [0.0; 3]);
+        assert_eq!(rgl.at(&pair), [0.0; 3]);
     }
 }
 
@@ -209,7 +209,7 @@ fn out_of_gamut_colours_are_cut_off_and_spectra_are_not() {
             theta_o: 0.0,
             phi_o: 0.0,
         };
-        for value in rgl.eval(&pair) {
+        for value in rgl.at(&pair) {
             assert!((value - expected).abs() < 1e-15);
         }
     }
@@ -234,7 +234,7 @@ fn samples_have_the_channels_of_the_file() {
     assert_eq!(samples.values.dim(), (36, 3));
     assert_eq!(
         samples.values.row(7).to_vec(),
-        rgl.eval(&samples.directions[7])
+        rgl.at(&samples.directions[7])
     );
 }
 

@@ -6,11 +6,12 @@
 use approx::assert_abs_diff_eq;
 use elm::ElmParams;
 use elm::solve::{Inverse, PseudoInverse};
-use elm_brdf::brdf::Fit;
 use elm_brdf::features::Features;
+use elm_brdf::fit::Fit;
 use elm_brdf::link::Link;
 use elm_brdf::model::BrdfParams;
 use elm_brdf::protocol::{Folds, cross_validate};
+use elm_datasets::Brdf;
 use elm_datasets::geometry::{Pair, pairs};
 use elm_datasets::{Invalid, MaterialId, Measurements, synthetic};
 use ndarray::{Axis, s};

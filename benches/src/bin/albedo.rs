@@ -12,9 +12,9 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use elm_brdf::albedo;
-use elm_brdf::brdf::{Brdf, Fit};
 use elm_brdf::model::Tuned;
 use elm_brdf::reference;
+use elm_datasets::Brdf;
 use elm_datasets::geometry::pairs;
 use elm_datasets::{Invalid, MaterialId, OpenOptions, Samples, curet, open, paint, synthetic};
 
@@ -34,7 +34,7 @@ fn largest(brdf: &dyn Brdf) -> elm_brdf::Result<(f64, f64)> {
     Ok(most)
 }
 
-fn nearest() -> Result<Box<dyn Fit>, Box<dyn Error>> {
+fn nearest() -> Result<Box<elm_brdf::fit::AnyFit>, Box<dyn Error>> {
     let found = reference::all()
         .into_iter()
         .find(|reference| reference.full_name() == "inverse-distance-5 (cosines, log)");

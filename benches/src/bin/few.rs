@@ -6,10 +6,11 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+use elm_datasets::Brdf;
 use std::error::Error;
 use std::path::PathBuf;
 
-use elm_brdf::brdf::Fit;
+use elm_brdf::fit::Fit;
 use elm_brdf::model::Tuned;
 use elm_brdf::prior::{Prior, PriorParams};
 use elm_brdf::protocol::Folds;

@@ -1,7 +1,7 @@
 //! Evaluation as a renderer wants it: many pairs of directions at once, component by component, in
 //! single precision if that will do, from directions to reflectance without an angle's sine.
 //!
-//! [`Brdf::eval`](crate::brdf::Brdf::eval) is the general way and works in `f64` on pairs as they
+//! [`Brdf::eval`](elm_datasets::Brdf::eval) is the general way and works in `f64` on pairs as they
 //! come. [`Packed`] is a [`BrdfModel`](crate::model::BrdfModel) made ready for this one: lanes of the
 //! vector unit are rows, the input scaling is folded into the weights, blocks of rows stay in the
 //! first-level cache from end to end. The published neural model,
@@ -37,7 +37,8 @@ mod inputs;
 mod packed;
 mod real;
 
-use ndarray::Array2;
+use elm_datasets::brdf::{EvalError, check_arguments};
+use ndarray::ArrayViewMut2;
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::error::{Error, Result};
@@ -139,15 +140,22 @@ pub enum Precision<'a> {
     Double(&'a dyn Batched<f64>),
 }
 
-/// [`Brdf::eval`](crate::brdf::Brdf::eval) by columns.
-pub(crate) fn eval_pairs<A: Real>(model: &dyn Batched<A>, pairs: &[Pair]) -> Result<Array2<f64>> {
-    crate::brdf::check_directions(pairs)?;
-    let mut values = vec![A::zero(); pairs.len() * model.channels()];
-    model.eval_into(&Columns::new(pairs), &mut values)?;
-    let shape = (pairs.len(), model.channels());
-    Ok(Array2::from_shape_fn(shape, |(row, channel)| {
-        values[channel * pairs.len() + row].as_f64()
-    }))
+/// [`Brdf::eval_into`](elm_datasets::Brdf::eval_into) by columns.
+pub(crate) fn eval_pairs<A: Real>(
+    model: &dyn Batched<A>,
+    pairs: &[Pair],
+    mut values: ArrayViewMut2<'_, f64>,
+) -> Result<(), EvalError> {
+    check_arguments(pairs, &values, model.channels())?;
+    let mut columns = vec![A::zero(); pairs.len() * model.channels()];
+    model.eval_into(&Columns::new(pairs), &mut columns)?;
+    let columns = columns.chunks_exact(pairs.len().max(1));
+    for (mut to, from) in values.columns_mut().into_iter().zip(columns) {
+        for (to, from) in to.iter_mut().zip(from) {
+            *to = from.as_f64();
+        }
+    }
+    Ok(())
 }
 
 /// How to evaluate one block.

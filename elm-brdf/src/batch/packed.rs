@@ -1,17 +1,20 @@
 //! A network of this project, packed for evaluation by columns.
 
+use crate::fit::Model;
 use elm::{Activation, Kind};
+use elm_datasets::brdf::EvalError;
 use ndarray::Array2;
+use ndarray::ArrayViewMut2;
 use pulp::Simd;
 
 use super::dense::{Dense, Fused, MOST_INPUTS, Rectified, SquaredRectified};
 use super::real::Real;
 use super::{Batched, Block, Columns, Kernel, ROWS, eval_pairs, inputs, run};
-use crate::brdf::Brdf;
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::link::Channel;
 use crate::model::BrdfModel;
+use elm_datasets::Brdf;
 use elm_datasets::geometry::Pair;
 
 /// A [`BrdfModel`] packed for [evaluation by columns](crate::batch) in `f32` or `f64`.
@@ -294,12 +297,18 @@ macro_rules! brdf {
                 self.links.len()
             }
 
+            fn eval_into(
+                &self,
+                pairs: &[Pair],
+                values: ArrayViewMut2<'_, f64>,
+            ) -> Result<(), EvalError> {
+                eval_pairs(self, pairs, values)
+            }
+        }
+
+        impl Model for Packed<$type> {
             fn multiply_adds(&self) -> usize {
                 self.neurons * (self.inputs() + self.links.len())
-            }
-
-            fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
-                eval_pairs(self, pairs)
             }
 
             fn floats_per_channel(&self) -> usize {

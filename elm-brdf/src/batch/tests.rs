@@ -1,13 +1,14 @@
 //! Columns against pairs, block ends, and what is refused.
 
 use super::*;
-use crate::brdf::Brdf;
 use crate::features::Features;
 use crate::link::Link;
 use crate::model::{BrdfModel, BrdfParams};
 use elm::solve::Ridge;
 use elm::{Activation, ElmParams, Kind};
+use elm_datasets::Brdf;
 use elm_datasets::geometry::cartesian;
+use ndarray::Array2;
 use ndarray::Axis;
 
 /// Directions all over the hemisphere, coincident and mirror ones among them.

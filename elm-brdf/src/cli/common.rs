@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::data::{self, Source};
 use super::{Failure, say};
 use crate::error::Error;
-use crate::render::{Library, default_network};
+use crate::scene_materials::Library;
 
 /// Reads one of `names`, and lists them in the help and in the error.
 pub(super) fn one_of<T>(
@@ -34,10 +34,7 @@ pub(super) fn library(named: Option<&Path>) -> Result<Library, Failure> {
         Source::Curet(dir) => Some(dir),
         Source::Synthetic => None,
     };
-    Ok(Library {
-        curet,
-        network: Box::new(default_network),
-    })
+    Ok(Library::new(curet))
 }
 
 /// Tells whoever sits at a terminal how to get measurements in place of the stand-in.

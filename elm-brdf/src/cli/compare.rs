@@ -11,7 +11,7 @@ use super::common::{hint, one_of, progress, usage};
 use super::data::Source;
 use super::samples::{Material, Reading};
 use super::{Failure, models, overwrite, print};
-use crate::brdf::Fit;
+use crate::fit::AnyFit;
 use crate::protocol::{Folds, MaterialScores, cross_validate, cross_validate_samples};
 use crate::reference::Reference;
 use crate::report::plot::{self, Shown};
@@ -154,7 +154,7 @@ impl Subject {
 
     fn cross_validate(
         &self,
-        method: &dyn Fit,
+        method: &AnyFit,
         folds: &Folds,
     ) -> Result<Vec<MaterialScores>, Failure> {
         Ok(match self {

@@ -8,11 +8,11 @@ use serde::Serialize;
 use super::common::one_of;
 use super::samples::{Material, Reading};
 use super::{Failure, print};
-use crate::brdf::Brdf;
 use crate::error::Error;
 use crate::file;
 use crate::metrics::Metrics;
 use crate::model::BrdfModel;
+use elm_datasets::Brdf;
 use elm_datasets::geometry::pairs;
 
 /// Judge a saved model by measurements.
@@ -94,7 +94,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     } = material;
     let samples = model.matched(samples)?;
     let pairs = pairs(&samples.directions);
-    let predicted = model.eval(&pairs)?;
+    let predicted = model.eval(&pairs).map_err(Error::from)?;
     let evaluation = Evaluation {
         rows: pairs.len(),
         metrics: Metrics::of(&pairs, predicted.view(), samples.values.view())?,

@@ -11,7 +11,8 @@ use crate::error::Error;
 use crate::export::{ExportError, Format, Language, header, merl_table, source};
 use crate::file;
 use crate::model::BrdfModel;
-use crate::render::{Supply, default_network, scene};
+use crate::recipes;
+use crate::scene_materials::MaterialTable;
 use elm_datasets::geometry::pairs;
 
 /// Write a model as source code or as a table, for other programs.
@@ -53,13 +54,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(file) => {
             let samples = reading.read(file)?.samples.in_rgb_order();
             let pairs = pairs(&samples.directions);
-            default_network(pairs.len(), None).fit(&pairs, samples.values.view())?
+            recipes::network(None).fit(&pairs, samples.values.view())?
         }
         None => {
             let library = library(reading.data.as_deref())?;
             library
-                .supply(&asked(&arguments.model), Path::new(""))?
-                .brdf
+                .model(&asked(&arguments.model), Path::new(""))?
+                .model
         }
     };
     match format {
@@ -87,14 +88,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// The material that a scene would call so.
-fn asked(model: &str) -> scene::Material {
-    let none = scene::Material::default();
+fn asked(model: &str) -> MaterialTable {
+    let none = MaterialTable::default();
     match model.split_once(':') {
-        Some(("curet", name)) => scene::Material {
+        Some(("curet", name)) => MaterialTable {
             curet: Some(name.to_owned()),
             ..none
         },
-        _ => scene::Material {
+        _ => MaterialTable {
             model: Some(model.into()),
             ..none
         },

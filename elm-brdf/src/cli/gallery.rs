@@ -13,7 +13,7 @@ use crate::export::ExportError;
 use crate::gallery::{self, Exhibit};
 use crate::model::BrdfModel;
 use crate::protocol::{Folds, cross_validate};
-use crate::render::default_network;
+use crate::recipes;
 use elm_datasets::geometry::pairs;
 
 /// Write a page that shows learnt materials: spheres, lobes, errors, sizes, and a sphere to play
@@ -31,7 +31,7 @@ pub(super) struct Arguments {
     /// 'paper', 'all', or a list of numbers and names, such as '1,39,orange peel'.
     #[arg(long, value_name = "LIST", default_value = "paper")]
     materials: String,
-    /// Neurons of each network instead of the usual 100.
+    /// Neurons of each network; chosen by the number of measurements if not given.
     #[arg(long, value_name = "N")]
     neurons: Option<usize>,
 }
@@ -48,7 +48,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     overwrite::refuse_folder(&arguments.out, &names, &source.files())?;
     let data = source.load(&materials, Invalid::Clamp)?;
     hint(&source);
-    let network = default_network(data.directions.len(), arguments.neurons);
+    let network = recipes::network(arguments.neurons);
     let folds = Folds::new(data.directions.len(), FOLDS.0, FOLDS.1)?;
     let scores = cross_validate(&*network, &data, &folds, |_, _| {})?;
     let origin = format!("ELM fitted to {}", source.caption());

@@ -9,6 +9,7 @@ use super::common::usage;
 use super::data::Source;
 use crate::error::Error;
 use crate::features::Features;
+use crate::fit::boxed;
 use crate::link::Link;
 use crate::model::{BrdfParams, Tuned};
 use crate::prior::PriorParams;
@@ -28,7 +29,7 @@ fn tuned(name: &str, seed: u64) -> Reference {
         link: Some(Link::default_log()),
         growth: Growth::Linear,
         network: true,
-        method: Box::new(Tuned {
+        method: boxed(Tuned {
             seed,
             ..Tuned::default()
         }),
@@ -127,7 +128,7 @@ fn networks(seed: u64) -> [Reference; 4] {
         link: Some(params.link),
         growth: Growth::Linear,
         network: true,
-        method: Box::new(params),
+        method: boxed(params),
     };
     [
         reference(
@@ -150,7 +151,7 @@ fn networks(seed: u64) -> [Reference; 4] {
         // What is fitted to count its numbers: a network without the prior, of as many neurons.
         Reference {
             features: Some(Features::SumDifference),
-            method: Box::new(Tuned {
+            method: boxed(Tuned {
                 features: Some(Features::SumDifference),
                 neurons: Some(PriorParams::default().neurons),
                 seed,

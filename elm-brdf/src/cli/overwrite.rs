@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::Failure;
-use crate::render::Scene;
+use crate::scene_materials::Scene;
 
 /// Refuses outputs that are inputs, by whatever names or links.
 pub(super) fn refuse<'a>(
@@ -68,14 +68,7 @@ pub(super) fn of_scene(path: &Path, scene: &Scene) -> Vec<PathBuf> {
     let mut inputs = vec![path.to_owned()];
     let folder = path.parent().unwrap_or(Path::new(""));
     for material in scene.material.values() {
-        let material = material.get_ref();
-        inputs.extend(
-            material
-                .csv
-                .iter()
-                .chain(&material.model)
-                .map(|file| folder.join(file)),
-        );
+        inputs.extend(material.get_ref().files().map(|file| folder.join(file)));
     }
     for mesh in &scene.mesh {
         inputs.extend(mesh.get_ref().file.iter().map(|file| folder.join(file)));

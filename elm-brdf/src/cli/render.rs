@@ -12,7 +12,9 @@ use super::{Failure, overwrite, print, say};
 use crate::error::Error;
 use crate::file;
 use crate::render::scene::Image;
-use crate::render::{Account, Options, Rendering, Savings, Scene, Sheet, builtin};
+use crate::render::{Account, Options, Rendering, Savings};
+use crate::scene_materials::{Scene, Sheet};
+use crate::scenes::builtin;
 
 /// Render a scene with learnt materials.
 ///
@@ -71,7 +73,8 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    Rendering::format(&arguments.output).map_err(|error| Failure::Usage(error.to_string()))?;
+    let format =
+        Rendering::format(&arguments.output).map_err(|error| Failure::Usage(error.to_string()))?;
     let mut sheet = match arguments.scene.strip_prefix("builtin:") {
         Some(name) => builtin(name, arguments.material.as_deref())
             .map_err(|e| Failure::Usage(e.to_string()))?,
@@ -98,11 +101,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         progress.set_position(done);
     });
     progress.finish_and_clear();
-    let rendering = rendering?;
+    let rendering = rendering.map_err(Error::from)?;
     for note in &rendering.account.notes {
         say(&format!("note: {note}"));
     }
-    rendering.write(&arguments.output)?;
+    let picture = rendering.encode(format).map_err(Error::from)?;
+    file::replace(&arguments.output, &picture)?;
     match &arguments.account {
         Some(path) => account(path, &rendering.account),
         None => Ok(()),

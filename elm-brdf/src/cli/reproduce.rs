@@ -11,7 +11,7 @@ use elm_datasets::{Invalid, Measurements};
 use super::common::{hint, one_of, progress, usage};
 use super::data::Source;
 use super::{Failure, models, overwrite, print};
-use crate::brdf::Fit;
+use crate::fit::{AnyFit, boxed};
 use crate::model::{BrdfParams, ScaledOnce};
 use crate::protocol::{Folds, MaterialScores, cross_validate};
 use crate::report::plot::{self, Shown};
@@ -202,14 +202,14 @@ impl Model {
     }
 
     /// The method of one seed; `None` where each material has its own.
-    fn method(&self, seed: u64) -> Result<Option<Box<dyn Fit>>, Failure> {
+    fn method(&self, seed: u64) -> Result<Option<Box<AnyFit>>, Failure> {
         Ok(match self {
             Self::Paper(params, once) => {
                 let params = (**params).clone().seed(seed);
                 Some(if *once {
-                    Box::new(ScaledOnce::new(params)?)
+                    boxed(ScaledOnce::new(params)?)
                 } else {
-                    Box::new(params)
+                    boxed(params)
                 })
             }
             Self::Named(name) => Some(models::named(name, seed)?.method),
@@ -293,7 +293,7 @@ fn draw(
     report: &Report,
     data: &Measurements,
     scores: &[MaterialScores],
-    method: Option<&dyn Fit>,
+    method: Option<&AnyFit>,
 ) -> Result<(), Failure> {
     let protocol = &report.protocol;
     let title = format!(

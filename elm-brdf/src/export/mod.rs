@@ -49,9 +49,9 @@ pub use error::ExportError;
 pub use precision::{SinglePrecision, check_precision};
 pub use write::{header, source};
 
-use crate::brdf::Brdf;
 use crate::error::{Error, Result};
 use crate::model::BrdfModel;
+use elm_datasets::Brdf;
 use elm_datasets::geometry::{Pair, pairs};
 
 /// What a model can be exported to.

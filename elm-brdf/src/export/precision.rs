@@ -7,9 +7,9 @@ use ndarray::{Array2, Zip};
 use super::error::ExportError;
 use super::network::{Network, Neuron};
 use crate::batch;
-use crate::brdf::Brdf;
 use crate::error::{Error, Result};
 use crate::model::BrdfModel;
+use elm_datasets::Brdf;
 use elm_datasets::geometry::{Pair, pairs};
 
 /// The error of evaluating a model in `f32` in place of `f64`, over directions all over the

@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 use std::fmt::Write;
 
-use crate::brdf::Brdf;
 use crate::error::Result;
+use elm_datasets::Brdf;
 use elm_datasets::geometry::{Pair, cartesian};
 
 /// Angles of the light in degrees, with the colour of each lobe.

@@ -8,14 +8,17 @@ mod lobes;
 
 use std::path::Path;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use crate::brdf::Brdf;
+use crate::batch::Packed;
 use crate::error::{Error, Result};
 use crate::export::{Language, source};
 use crate::file;
+use crate::fit::Model;
 use crate::model::BrdfModel;
-use crate::render::{Material, Options, Scene, Supplied, Supply, render, scene};
+use crate::render::{
+    LoadError, LoadedMaterial, Material, MaterialLoader, Options, Rendering, Scene, render,
+};
 
 /// A material to show.
 #[derive(Debug, Clone)]
@@ -79,12 +82,12 @@ pub fn sphere(
     viewer: [f64; 3],
     up: [f64; 3],
     light: [f64; 3],
-) -> Result<Scene> {
+) -> Result<Scene<Shown>> {
     let position = viewer.map(|c| 5.0 * c);
     let text = format!(
         "[image]\nwidth = {size}\nheight = {size}\nsamples = {samples}\n\
          [camera]\nposition = {position:?}\ntarget = [0, 0, 0]\nup = {up:?}\nheight = {height}\n\
-         [material.shown]\nmodel = 'shown'\n\
+         [material.shown]\n\
          [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'shown'\n\
          [[directional]]\ntowards = {light:?}\n\
          irradiance = [{IRRADIANCE}, {IRRADIANCE}, {IRRADIANCE}]\n",
@@ -93,20 +96,21 @@ pub fn sphere(
     Ok(Scene::parse(&text, Path::new("gallery"))?)
 }
 
+/// The material of [`sphere`], of which there is nothing to say.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shown {}
+
 /// The one model of [`sphere`].
 pub struct Only<'a>(
     /// The model.
     pub &'a BrdfModel,
 );
 
-impl Supply for Only<'_> {
-    fn supply(&self, _: &scene::Material, _: &Path) -> Result<Supplied> {
-        Ok(Supplied {
-            brdf: Box::new(self.0.clone()),
-            origin: String::new(),
-            name: None,
-            notes: Vec::new(),
-        })
+impl MaterialLoader<Shown> for Only<'_> {
+    fn load(&self, _: &Shown, _: &Path) -> Result<LoadedMaterial, LoadError> {
+        let packed = Packed::<f64>::new(self.0)?;
+        Ok(LoadedMaterial::new(Box::new(packed), ""))
     }
 }
 
@@ -137,7 +141,8 @@ pub fn write(
             Options::default(),
             &|_, _| {},
         )?;
-        rendering.write(&dir.join(&picture))?;
+        let path = dir.join(&picture);
+        file::replace(&path, &rendering.encode(Rendering::format(&path)?)?)?;
         cards.push(card(exhibit, picture)?);
         done(index + 1);
     }

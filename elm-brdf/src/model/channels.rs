@@ -5,8 +5,8 @@ use elm_datasets::{Samples, channel};
 use ndarray::Axis;
 
 use super::BrdfModel;
-use crate::brdf::Brdf;
 use crate::error::{Error, Result};
+use elm_datasets::Brdf;
 
 impl BrdfModel {
     /// The samples with the channels of this model, in its order: matched by name, colour or

@@ -15,24 +15,26 @@ mod layer;
 mod scaled_once;
 mod tuned;
 
+use elm_datasets::brdf::EvalError;
 use std::any::Any;
 use std::path::Path;
 
 use elm::solve::PseudoInverse;
 use elm::{Activation, Elm, ElmParams, persist};
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 use serde::{Deserialize, Serialize};
 
-use crate::brdf::{Brdf, Fit, check, check_directions};
 use crate::error::Result;
 use crate::features::Features;
+use crate::fit::{Fit, Model, assign, check};
 use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
+use elm_datasets::Brdf;
+use elm_datasets::brdf::check_directions;
 use elm_datasets::geometry::Pair;
 pub use layer::{Draw, Layer};
 pub use scaled_once::ScaledOnce;
-pub(crate) use tuned::SideBySide;
-pub use tuned::{Lean, Tuned};
+pub use tuned::{Lean, SideBySide, Tuned};
 
 /// What a [`BrdfModel`] is made of.
 #[derive(Debug, Clone, PartialEq)]
@@ -216,22 +218,15 @@ impl BrdfParams {
 }
 
 impl Fit for BrdfParams {
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
-        Ok(Box::new(self.fit_model(pairs, values)?))
+    type Model = BrdfModel;
+
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+        self.fit_model(pairs, values)
     }
 }
 
-impl Brdf for BrdfModel {
-    fn channels(&self) -> usize {
-        self.network.outputs()
-    }
-
-    fn multiply_adds(&self) -> usize {
-        let neurons = self.network.hidden().neurons();
-        neurons * (self.network.inputs() + self.network.outputs())
-    }
-
-    fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
+impl BrdfModel {
+    fn values_at(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
         check_directions(pairs)?;
         let targets = self.network.predict(&self.features.compute(pairs))?;
         let mut values = self.link.to_values(targets)?;
@@ -241,6 +236,23 @@ impl Brdf for BrdfModel {
             }
         }
         Ok(values)
+    }
+}
+
+impl Brdf for BrdfModel {
+    fn channels(&self) -> usize {
+        self.network.outputs()
+    }
+
+    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+        assign(self.values_at(pairs)?, values)
+    }
+}
+
+impl Model for BrdfModel {
+    fn multiply_adds(&self) -> usize {
+        let neurons = self.network.hidden().neurons();
+        neurons * (self.network.inputs() + self.network.outputs())
     }
 
     fn stored_floats(&self) -> usize {

@@ -2,9 +2,9 @@
 
 use ndarray::{Array2, ArrayView2};
 
-use super::BrdfParams;
-use crate::brdf::{Brdf, Fit};
+use super::{BrdfModel, BrdfParams};
 use crate::error::{Error, Result};
+use crate::fit::Fit;
 use crate::link::Link;
 use elm_datasets::geometry::Pair;
 
@@ -34,7 +34,9 @@ impl ScaledOnce {
 }
 
 impl Fit for ScaledOnce {
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+    type Model = BrdfModel;
+
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         self.0.fit(pairs, values)
     }
 

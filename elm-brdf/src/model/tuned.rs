@@ -13,14 +13,16 @@ mod rows;
 mod survey;
 
 use elm::{Activation, Biases, Distribution, ElmParams, FeatureMap, Neurons, Scaler};
-use ndarray::{Array2, ArrayView2, Axis};
+use elm_datasets::brdf::EvalError;
+use ndarray::{Array2, ArrayView2, ArrayViewMut2, Axis};
 
 use super::{BrdfModel, Draw, Provenance};
-use crate::brdf::{Brdf, Fit, check};
 use crate::error::{Error, Result};
 use crate::features::Features;
+use crate::fit::{Fit, Model, assign, check};
 use crate::metrics::Metric;
 use crate::quality;
+use elm_datasets::Brdf;
 use elm_datasets::geometry::Pair;
 use finish::Finished;
 pub use lean::Lean;
@@ -224,7 +226,9 @@ impl Tuned {
 }
 
 impl Fit for Tuned {
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+    type Model = SideBySide;
+
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         check(pairs, values)?;
         let each: Vec<Vec<usize>> = (0..values.ncols()).map(|channel| vec![channel]).collect();
         let models = if pairs.len() > Self::MANY {
@@ -234,23 +238,15 @@ impl Fit for Tuned {
         } else {
             few::fit(self, pairs, values, &each)?
         };
-        Ok(Box::new(SideBySide(models)))
+        Ok(SideBySide(models))
     }
 }
 
 /// Models of one channel or more each, side by side.
-pub(crate) struct SideBySide(pub(crate) Vec<BrdfModel>);
+pub struct SideBySide(pub(crate) Vec<BrdfModel>);
 
-impl Brdf for SideBySide {
-    fn channels(&self) -> usize {
-        self.0.iter().map(Brdf::channels).sum()
-    }
-
-    fn multiply_adds(&self) -> usize {
-        self.0.iter().map(Brdf::multiply_adds).sum()
-    }
-
-    fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
+impl SideBySide {
+    fn values_at(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
         let mut values = Array2::zeros((pairs.len(), self.channels()));
         let mut first = 0;
         for model in &self.0 {
@@ -261,11 +257,27 @@ impl Brdf for SideBySide {
         }
         Ok(values)
     }
+}
+
+impl Brdf for SideBySide {
+    fn channels(&self) -> usize {
+        self.0.iter().map(Brdf::channels).sum()
+    }
+
+    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+        assign(self.values_at(pairs)?, values)
+    }
+}
+
+impl Model for SideBySide {
+    fn multiply_adds(&self) -> usize {
+        self.0.iter().map(Model::multiply_adds).sum()
+    }
 
     fn floats_per_channel(&self) -> usize {
         self.0
             .iter()
-            .map(Brdf::floats_per_channel)
+            .map(Model::floats_per_channel)
             .max()
             .unwrap_or(0)
     }

@@ -1,21 +1,19 @@
 //! Every model that the project can fit.
 
 use elm::Activation;
-use ndarray::ArrayView2;
 
-use crate::brdf::{Brdf, Fit};
-use crate::error::Result;
+use crate::fit::{AnyFit, boxed};
 use crate::metrics::Metric;
 use crate::model::{BrdfParams, Lean, Tuned};
+use crate::recipes::Joint;
 use crate::reference;
-use elm_datasets::geometry::Pair;
 
 /// A way to fit a model, with its name.
 pub struct Candidate {
     /// The name.
     pub name: String,
     /// The way.
-    pub method: Box<dyn Fit>,
+    pub method: Box<AnyFit>,
 }
 
 /// Sizes of networks.
@@ -36,7 +34,7 @@ pub fn all(metric: Metric, seed: u64) -> Vec<Candidate> {
                 let kind = if pruned { "pruned" } else { "drawn" };
                 all.push(Candidate {
                     name: format!("elm {activation} {neurons} {kind}"),
-                    method: Box::new(Lean {
+                    method: boxed(Lean {
                         activation: activation.clone(),
                         pruned,
                         metric,
@@ -49,7 +47,7 @@ pub fn all(metric: Metric, seed: u64) -> Vec<Candidate> {
     }
     all.push(Candidate {
         name: "elm (paper)".to_owned(),
-        method: Box::new(BrdfParams::paper(50).seed(seed)),
+        method: boxed(BrdfParams::paper(50).seed(seed)),
     });
     let tuned = Tuned {
         metric,
@@ -58,7 +56,7 @@ pub fn all(metric: Metric, seed: u64) -> Vec<Candidate> {
     };
     all.push(Candidate {
         name: "elm (tuned)".to_owned(),
-        method: Box::new(Jointly(tuned)),
+        method: boxed(Joint(tuned)),
     });
     all.extend(reference::all().into_iter().map(|reference| {
         let reference = reference.affordable(seed);
@@ -68,13 +66,4 @@ pub fn all(metric: Metric, seed: u64) -> Vec<Candidate> {
         }
     }));
     all
-}
-
-/// One network for all channels, where [`Tuned`] as a [`Fit`] makes one for each.
-struct Jointly(Tuned);
-
-impl Fit for Jointly {
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
-        Ok(Box::new(self.0.fit_model(pairs, values)?))
-    }
 }

@@ -5,8 +5,8 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use crate::batch::{Batched, Columns, Packed, Precision, Real};
-use crate::brdf::Brdf;
 use crate::error::Result;
+use crate::fit::Model;
 use crate::reference::Nbrdf;
 use elm_datasets::geometry::Pair;
 
@@ -21,11 +21,11 @@ const TURN: f64 = 1e-3;
 enum Timed<'a> {
     Single(&'a dyn Batched<f32>, Columns<f32>, Vec<f32>),
     Double(&'a dyn Batched<f64>, Columns<f64>, Vec<f64>),
-    General(&'a dyn Brdf, Vec<Pair>),
+    General(&'a dyn Model, Vec<Pair>),
 }
 
 /// The median time of an evaluation for each model, in nanoseconds.
-pub(super) fn take_turns(models: &[Box<dyn Brdf>], pairs: &[Pair]) -> Result<Vec<f64>> {
+pub(super) fn take_turns(models: &[Box<dyn Model>], pairs: &[Pair]) -> Result<Vec<f64>> {
     let batch: Vec<Pair> = pairs.iter().copied().cycle().take(BATCH).collect();
     // Of each the passes in a turn and the nanoseconds so far.
     let mut all = Vec::with_capacity(models.len());
@@ -52,7 +52,7 @@ pub(super) fn take_turns(models: &[Box<dyn Brdf>], pairs: &[Pair]) -> Result<Vec
 }
 
 /// The model for directions in columns, where it is packed for them.
-fn by_columns(model: &dyn Brdf) -> Option<Precision<'_>> {
+fn by_columns(model: &dyn Model) -> Option<Precision<'_>> {
     let any: &dyn Any = model;
     if let Some(packed) = any.downcast_ref::<Packed<f32>>() {
         Some(Precision::Single(packed))
@@ -65,7 +65,7 @@ fn by_columns(model: &dyn Brdf) -> Option<Precision<'_>> {
 }
 
 impl<'a> Timed<'a> {
-    fn new(model: &'a dyn Brdf, batch: &[Pair]) -> Self {
+    fn new(model: &'a dyn Model, batch: &[Pair]) -> Self {
         fn room<A: Real>(model: &dyn Batched<A>, batch: &[Pair]) -> (Columns<A>, Vec<A>) {
             let values = vec![A::zero(); batch.len() * model.channels()];
             (Columns::new(batch), values)

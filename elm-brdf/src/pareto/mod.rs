@@ -19,8 +19,8 @@ use serde::{Deserialize, Serialize};
 pub use candidates::{Candidate, all};
 
 use crate::batch::Packed;
-use crate::brdf::Brdf;
 use crate::error::Result;
+use crate::fit::Model;
 use crate::metrics::{Metric, Metrics};
 use crate::model::BrdfModel;
 use elm_datasets::geometry::Pair;
@@ -80,7 +80,7 @@ pub struct Given {
     /// Its name.
     pub name: String,
     /// The model.
-    pub model: Box<dyn Brdf>,
+    pub model: Box<dyn Model>,
     /// Seconds to read it.
     pub seconds: f64,
 }
@@ -98,7 +98,7 @@ pub fn run(
     mut done: impl FnMut(usize),
 ) -> Result<Vec<Point>> {
     let mut points = Vec::new();
-    let mut models: Vec<Box<dyn Brdf>> = Vec::new();
+    let mut models: Vec<Box<dyn Model>> = Vec::new();
     for (index, candidate) in candidates.iter().enumerate() {
         let mut seconds = Vec::new();
         // By form, then by problem.
@@ -163,7 +163,7 @@ pub fn run(
 }
 
 /// A network in single and in double precision, packed; any other model as it is.
-fn forms(name: &str, model: Box<dyn Brdf>) -> Result<Vec<(String, Box<dyn Brdf>)>> {
+fn forms(name: &str, model: Box<dyn Model>) -> Result<Vec<(String, Box<dyn Model>)>> {
     let Some(network) = BrdfModel::of(&*model) else {
         return Ok(vec![(name.to_owned(), model)]);
     };
@@ -179,7 +179,7 @@ fn forms(name: &str, model: Box<dyn Brdf>) -> Result<Vec<(String, Box<dyn Brdf>)
     ])
 }
 
-fn judge(model: &dyn Brdf, problem: &Problem, metric: Metric) -> Result<f64> {
+fn judge(model: &dyn Model, problem: &Problem, metric: Metric) -> Result<f64> {
     let predicted = model.eval(&problem.test)?;
     let metrics = Metrics::of(&problem.test, predicted.view(), problem.test_values.view())?;
     Ok(metric.of(&metrics))

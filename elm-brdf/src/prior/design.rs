@@ -3,8 +3,8 @@
 use ndarray::{Array1, Axis, Zip};
 
 use super::Prior;
-use crate::brdf::check_directions;
 use crate::error::{Error, Result};
+use elm_datasets::brdf::check_directions;
 use elm_datasets::geometry::Pair;
 
 /// The variance that no measurement explains, relative to the prior's mean variance.

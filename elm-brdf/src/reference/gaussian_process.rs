@@ -1,14 +1,16 @@
 //! Gaussian process regression.
 
-use ndarray::{Array1, Array2, ArrayView2, Axis};
+use elm_datasets::brdf::EvalError;
+use ndarray::{Array1, Array2, ArrayView2, ArrayViewMut2, Axis};
 
 use super::inputs::{Frame, squared_distances};
 use super::kernel::{Projected, Weights, check_rows};
-use crate::brdf::{Brdf, Fit};
 use crate::error::{Error, Result};
 use crate::features::Features;
+use crate::fit::{Fit, Model, assign};
 use crate::link::Link;
 use crate::scales::spread;
+use elm_datasets::Brdf;
 use elm_datasets::geometry::Pair;
 
 /// Correlation of the process at a distance $r$ in units of the length scales.
@@ -68,7 +70,8 @@ fn noises() -> impl Iterator<Item = f64> {
     (-16..=2).map(|step| 10.0_f64.powf(f64::from(step) / 2.0))
 }
 
-struct Fitted {
+/// A fitted [`GaussianProcess`].
+pub struct GaussianProcessModel {
     frame: Frame,
     covariance: Covariance,
     nodes: Array2<f64>,
@@ -117,7 +120,9 @@ fn kernel(covariance: Covariance, a: &Array2<f64>, b: &Array2<f64>) -> Array2<f6
 }
 
 impl Fit for GaussianProcess {
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+    type Model = GaussianProcessModel;
+
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         if self.candidates == 0 {
             return Err(Error::Parameter {
                 name: "candidates",
@@ -174,21 +179,17 @@ impl Fit for GaussianProcess {
                 members,
             });
         }
-        Ok(Box::new(Fitted {
+        Ok(GaussianProcessModel {
             frame,
             covariance: self.covariance,
             nodes: x,
             processes,
-        }))
+        })
     }
 }
 
-impl Brdf for Fitted {
-    fn channels(&self) -> usize {
-        self.frame.channels()
-    }
-
-    fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
+impl GaussianProcessModel {
+    fn values_at(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
         let x = self.frame.points(pairs)?;
         let mut targets = Array2::zeros((pairs.len(), self.channels()));
         for process in &self.processes {
@@ -201,7 +202,19 @@ impl Brdf for Fitted {
         }
         self.frame.values(pairs, targets)
     }
+}
 
+impl Brdf for GaussianProcessModel {
+    fn channels(&self) -> usize {
+        self.frame.channels()
+    }
+
+    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+        assign(self.values_at(pairs)?, values)
+    }
+}
+
+impl Model for GaussianProcessModel {
     fn floats_per_channel(&self) -> usize {
         // Nodes and their weights; length scales and mean.
         self.nodes.len()

@@ -3,10 +3,11 @@
 use elm::Scaler;
 use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
 
-use crate::brdf::{check, check_directions};
 use crate::error::Result;
 use crate::features::Features;
+use crate::fit::check;
 use crate::link::{FittedLink, Link};
+use elm_datasets::brdf::check_directions;
 use elm_datasets::geometry::Pair;
 
 /// From directions to points in a space where distance means something, and from predicted

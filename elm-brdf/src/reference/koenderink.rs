@@ -1,12 +1,15 @@
 //! The orthogonal basis that CUReT itself represents its materials by.
 
+use elm_datasets::brdf::EvalError;
 use std::f64::consts::PI;
 
 use elm::solve::{LeastSquares, Solver};
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 
-use crate::brdf::{Brdf, Fit, check, check_directions};
 use crate::error::Result;
+use crate::fit::{Fit, Model, assign, check};
+use elm_datasets::Brdf;
+use elm_datasets::brdf::check_directions;
 use elm_datasets::geometry::Pair;
 
 /// A linear combination of the isotropic and reciprocal functions that Zernike's polynomials
@@ -30,7 +33,7 @@ pub struct Koenderink {
 }
 
 /// A [`Koenderink`] basis with the coefficients found for each channel.
-struct Fitted {
+pub struct KoenderinkModel {
     modes: Modes,
     /// Shape (modes, channels).
     coefficients: Array2<f64>,
@@ -109,30 +112,40 @@ impl Modes {
 }
 
 impl Fit for Koenderink {
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+    type Model = KoenderinkModel;
+
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         check(pairs, values)?;
         let modes = Modes::new(self.order);
         let design = modes.design(pairs);
         let values = values.to_owned();
         let solution = self.solver.solve(&LeastSquares::new(&design, &values)?)?;
-        Ok(Box::new(Fitted {
+        Ok(KoenderinkModel {
             modes,
             coefficients: solution.beta,
-        }))
+        })
     }
 }
 
-impl Brdf for Fitted {
-    fn channels(&self) -> usize {
-        self.coefficients.ncols()
-    }
-
-    fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
+impl KoenderinkModel {
+    fn values_at(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
         check_directions(pairs)?;
         let values = self.modes.design(pairs).dot(&self.coefficients);
         Ok(values.mapv_into(|value| value.max(0.0)))
     }
+}
 
+impl Brdf for KoenderinkModel {
+    fn channels(&self) -> usize {
+        self.coefficients.ncols()
+    }
+
+    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+        assign(self.values_at(pairs)?, values)
+    }
+}
+
+impl Model for KoenderinkModel {
     fn floats_per_channel(&self) -> usize {
         self.coefficients.nrows()
     }

@@ -11,7 +11,7 @@
 //! | [`Nbrdf`]: a published network, read from its weights | half and difference vectors | 675 for three channels |
 //!
 //! Every one but the last implements [`Fit`], treats each channel by itself (so none pools materials), shares
-//! factorisations between channels, and returns a [`Brdf`](crate::brdf::Brdf) that is finite, not
+//! factorisations between channels, and returns a [`Brdf`](elm_datasets::Brdf) that is finite, not
 //! negative, and 0 where light or viewer is at or below the horizon.
 //!
 //! ```
@@ -42,15 +42,15 @@ mod thinned;
 use elm::solve::Ridge;
 
 pub use analytic::{Analytic, AnalyticModel, Shape};
-pub use gaussian_process::{Covariance, GaussianProcess};
-pub use koenderink::Koenderink;
+pub use gaussian_process::{Covariance, GaussianProcess, GaussianProcessModel};
+pub use koenderink::{Koenderink, KoenderinkModel};
 pub use nbrdf::Nbrdf;
-pub use neighbours::Neighbours;
-pub use radial::{Radial, RadialBasis, Smoothing};
+pub use neighbours::{Neighbours, NeighboursModel};
+pub use radial::{Radial, RadialBasis, RadialBasisModel, Smoothing};
 use thinned::Thinned;
 
-use crate::brdf::Fit;
 use crate::features::Features;
+use crate::fit::{AnyFit, boxed};
 use crate::link::Link;
 
 /// A method with the words that a table needs.
@@ -67,7 +67,7 @@ pub struct Reference {
     /// of a table.
     pub network: bool,
     /// The method.
-    pub method: Box<dyn Fit>,
+    pub method: Box<AnyFit>,
 }
 
 /// A model's name with its inputs and target, where it has a choice of them.
@@ -147,7 +147,7 @@ fn with_candidates(candidates: usize) -> Vec<Reference> {
             link: None,
             growth: Growth::Grid,
             network: false,
-            method: Box::new(model),
+            method: boxed(model),
         })
         .collect();
     all.extend([2, 8].map(|order| Reference {
@@ -157,7 +157,7 @@ fn with_candidates(candidates: usize) -> Vec<Reference> {
         growth: Growth::Linear,
         network: false,
         // Order 8 overfits without: 55 coefficients, some 185 measurements.
-        method: Box::new(Koenderink {
+        method: boxed(Koenderink {
             order,
             solver: Ridge::leave_one_out().into(),
         }),
@@ -174,15 +174,15 @@ fn with_candidates(candidates: usize) -> Vec<Reference> {
 }
 
 fn interpolators(features: Features, link: Link, candidates: usize) -> Vec<Reference> {
-    let neighbours = |count| -> Box<dyn Fit> {
-        Box::new(Neighbours {
+    let neighbours = |count| -> Box<AnyFit> {
+        boxed(Neighbours {
             features,
             link,
             count,
         })
     };
-    let radial = |radial, smoothing| -> Box<dyn Fit> {
-        Box::new(RadialBasis {
+    let radial = |radial, smoothing| -> Box<AnyFit> {
+        boxed(RadialBasis {
             features,
             link,
             radial,
@@ -206,10 +206,10 @@ fn interpolators(features: Features, link: Link, candidates: usize) -> Vec<Refer
         (
             "gaussian-process",
             ManyCubic,
-            Box::new(GaussianProcess {
+            boxed(GaussianProcess {
                 candidates,
                 ..GaussianProcess::new(features, link)
-            }) as Box<dyn Fit>,
+            }),
         ),
     ];
     methods

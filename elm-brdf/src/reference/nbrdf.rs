@@ -1,14 +1,16 @@
 //! The published neural reflectance model NBRDF, from its weights.
 
+use crate::fit::Model;
+use elm_datasets::brdf::EvalError;
+use ndarray::ArrayViewMut2;
 use std::fs;
 use std::path::Path;
 
-use ndarray::Array2;
 use pulp::Simd;
 
 use crate::batch::{Batched, Block, Columns, Dense, Kernel, ROWS, Real, eval_pairs, run};
-use crate::brdf::Brdf;
 use crate::error::{Error, Result};
+use elm_datasets::Brdf;
 use elm_datasets::geometry::Pair;
 
 /// Neurons of each of its two hidden layers.
@@ -204,12 +206,14 @@ impl Brdf for Nbrdf {
         CHANNELS
     }
 
+    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+        eval_pairs(self, pairs, values)
+    }
+}
+
+impl Model for Nbrdf {
     fn multiply_adds(&self) -> usize {
         (INPUTS + NEURONS + CHANNELS) * NEURONS
-    }
-
-    fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
-        eval_pairs(self, pairs)
     }
 
     fn floats_per_channel(&self) -> usize {

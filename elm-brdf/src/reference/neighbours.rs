@@ -1,12 +1,14 @@
 //! Nearest neighbours and inverse distance weighting.
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
+use elm_datasets::brdf::EvalError;
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut2};
 
 use super::inputs::{Frame, squared_distances};
-use crate::brdf::{Brdf, Fit};
 use crate::error::{Error, Result};
 use crate::features::Features;
+use crate::fit::{Fit, Model, assign};
 use crate::link::Link;
+use elm_datasets::Brdf;
 use elm_datasets::geometry::Pair;
 
 /// The mean of the targets at the nearest nodes, each weighted by $r^{-p}$ of its distance $r$
@@ -31,7 +33,8 @@ const POWERS: std::ops::RangeInclusive<i32> = 1..=8;
 /// With more rows than this, leave-one-out is measured on so many of them, evenly spread.
 const MOST_TRIALS: usize = 1000;
 
-struct Fitted {
+/// Measurements kept by [`Neighbours`].
+pub struct NeighboursModel {
     frame: Frame,
     count: usize,
     nodes: Array2<f64>,
@@ -54,7 +57,9 @@ impl Neighbours {
 }
 
 impl Fit for Neighbours {
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+    type Model = NeighboursModel;
+
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         if self.count == 0 {
             return Err(Error::Parameter {
                 name: "number of neighbours",
@@ -68,13 +73,13 @@ impl Fit for Neighbours {
         } else {
             best_powers(&nodes, &targets, self.count)
         };
-        Ok(Box::new(Fitted {
+        Ok(NeighboursModel {
             frame,
             count: self.count,
             nodes,
             targets,
             powers,
-        }))
+        })
     }
 }
 
@@ -142,12 +147,8 @@ fn weighted(near: &[(usize, f64)], targets: &Array2<f64>, power: i32) -> Array1<
     if total > 0.0 { sum / total } else { sum }
 }
 
-impl Brdf for Fitted {
-    fn channels(&self) -> usize {
-        self.frame.channels()
-    }
-
-    fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
+impl NeighboursModel {
+    fn values_at(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
         let points = self.frame.points(pairs)?;
         let mut targets = Array2::zeros((pairs.len(), self.channels()));
         for (row, mut out) in targets.rows_mut().into_iter().enumerate() {
@@ -165,7 +166,19 @@ impl Brdf for Fitted {
         }
         self.frame.values(pairs, targets)
     }
+}
 
+impl Brdf for NeighboursModel {
+    fn channels(&self) -> usize {
+        self.frame.channels()
+    }
+
+    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+        assign(self.values_at(pairs)?, values)
+    }
+}
+
+impl Model for NeighboursModel {
     fn floats_per_channel(&self) -> usize {
         // Nodes and targets, and the power.
         self.nodes.len() + self.nodes.nrows() + 1 + self.frame.floats_per_channel()

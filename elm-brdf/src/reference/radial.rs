@@ -1,13 +1,15 @@
 //! Interpolation by radial basis functions with a polynomial.
 
-use ndarray::{Array2, ArrayView2};
+use elm_datasets::brdf::EvalError;
+use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 
 use super::inputs::{Frame, join_duplicates, squared_distances};
 use super::kernel::{Projected, Weights, check_rows};
-use crate::brdf::{Brdf, Fit};
 use crate::error::Result;
 use crate::features::Features;
+use crate::fit::{Fit, Model, assign};
 use crate::link::Link;
+use elm_datasets::Brdf;
 use elm_datasets::geometry::Pair;
 
 /// A radial basis function of the distance $r$.
@@ -63,7 +65,8 @@ pub struct RadialBasis {
     pub smoothing: Smoothing,
 }
 
-struct Fitted {
+/// A fitted [`RadialBasis`].
+pub struct RadialBasisModel {
     frame: Frame,
     radial: Radial,
     nodes: Array2<f64>,
@@ -84,7 +87,9 @@ fn polynomial(x: &Array2<f64>, terms: usize) -> Array2<f64> {
 }
 
 impl Fit for RadialBasis {
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+    type Model = RadialBasisModel;
+
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         let (frame, x, targets) = Frame::fit(self.features, self.link, pairs, values)?;
         let (nodes, targets) = match self.smoothing {
             Smoothing::Exact => join_duplicates(&x, &targets),
@@ -104,12 +109,12 @@ impl Fit for RadialBasis {
             Smoothing::Exact => vec![0.0; targets.ncols()],
             Smoothing::LeaveOneOut => leave_one_out(&projected, targets.view()),
         };
-        Ok(Box::new(Fitted {
+        Ok(RadialBasisModel {
             weights: projected.weights(kernel.view(), targets.view(), &lambda),
             frame,
             radial,
             nodes,
-        }))
+        })
     }
 }
 
@@ -131,19 +136,27 @@ fn leave_one_out(projected: &Projected, targets: ArrayView2<'_, f64>) -> Vec<f64
     best.into_iter().map(|(_, lambda)| lambda).collect()
 }
 
-impl Brdf for Fitted {
-    fn channels(&self) -> usize {
-        self.frame.channels()
-    }
-
-    fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
+impl RadialBasisModel {
+    fn values_at(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
         let x = self.frame.points(pairs)?;
         let kernel = squared_distances(&x, &self.nodes).mapv(|d| self.radial.of_squared(d));
         let tail = polynomial(&x, self.weights.tail.nrows()).dot(&self.weights.tail);
         self.frame
             .values(pairs, kernel.dot(&self.weights.kernel) + tail)
     }
+}
 
+impl Brdf for RadialBasisModel {
+    fn channels(&self) -> usize {
+        self.frame.channels()
+    }
+
+    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+        assign(self.values_at(pairs)?, values)
+    }
+}
+
+impl Model for RadialBasisModel {
     fn floats_per_channel(&self) -> usize {
         self.nodes.len()
             + self.weights.kernel.nrows()

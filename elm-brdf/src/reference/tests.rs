@@ -2,9 +2,11 @@
 
 use super::*;
 use crate::error::Error;
+use crate::fit::Fit;
 use approx::{assert_abs_diff_eq, assert_relative_eq};
-use elm_datasets::analytic::{self, Angles};
+use elm_datasets::Brdf;
 use elm_datasets::geometry::{Pair, cartesian};
+use elm_datasets::lobes::{self, Cosines};
 use ndarray::{Array2, Axis, array};
 use std::f64::consts::{FRAC_PI_4, PI};
 
@@ -36,15 +38,15 @@ fn directions(count: usize) -> Vec<Pair> {
         .collect()
 }
 
-fn measured(pairs: &[Pair], model: impl Fn(&Angles) -> f64) -> Array2<f64> {
+fn measured(pairs: &[Pair], model: impl Fn(&Cosines) -> f64) -> Array2<f64> {
     let value = |pair: &Pair| {
-        Angles::of_vectors(pair.incident, pair.outgoing).map_or(0.0, |angles| model(&angles))
+        Cosines::of_vectors(pair.incident, pair.outgoing).map_or(0.0, |angles| model(&angles))
     };
     Array2::from_shape_fn((pairs.len(), 1), |(row, _)| value(&pairs[row]))
 }
 
 /// A gloss on a rough diffuse ground.
-fn glossy(angles: &Angles) -> f64 {
+fn glossy(angles: &Cosines) -> f64 {
     0.3 * angles.oren_nayar(0.4) + 0.2 * angles.ward(0.25)
 }
 
@@ -52,7 +54,7 @@ fn glossy(angles: &Angles) -> f64 {
 fn parameters_of_noiseless_data_are_found_again() {
     let pairs = directions(150);
     let diffuse = 0.2 / PI;
-    type Model = Box<dyn Fn(&Angles) -> f64>;
+    type Model = Box<dyn Fn(&Cosines) -> f64>;
     let table: [(Analytic, Model, &[f64], &[f64]); 9] = [
         (Analytic::Lambert, Box::new(move |_| diffuse), &[], &[0.2]),
         (
@@ -172,7 +174,7 @@ fn analytic_models_agree_with_the_formulas_of_the_data_crate() {
         phi_o: 3.0,
     };
     let value = model.eval(&[Pair::from(&other)]).unwrap();
-    let expected = analytic::phong(&other, 0.1, 0.05, 8.0);
+    let expected = lobes::phong(&other, 0.1, 0.05, 8.0);
     assert_relative_eq!(value[[0, 0]], expected, max_relative = 1e-8);
 }
 
@@ -194,7 +196,7 @@ fn exact_interpolators_meet_their_nodes() {
 
 #[test]
 fn smoothing_interpolators_predict_a_smooth_function_they_were_not_shown() {
-    let (pairs, truth) = (directions(300), |a: &Angles| {
+    let (pairs, truth) = (directions(300), |a: &Cosines| {
         0.3 * a.oren_nayar(0.4) + 0.1 * a.ward(0.6)
     });
     let values = measured(&pairs, truth);

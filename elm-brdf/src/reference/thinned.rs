@@ -3,8 +3,8 @@
 use ndarray::{ArrayView2, Axis};
 use rand::seq::index;
 
-use crate::brdf::{Brdf, Fit};
 use crate::error::Result;
+use crate::fit::{AnyFit, Fit, Model};
 use crate::streams::{self, generator};
 use elm_datasets::geometry::Pair;
 
@@ -12,7 +12,7 @@ use elm_datasets::geometry::Pair;
 /// afford: dense kernel matrices grow with the square of the rows, their decompositions with the
 /// cube.
 pub(crate) struct Thinned {
-    pub(crate) method: Box<dyn Fit>,
+    pub(crate) method: Box<AnyFit>,
     /// The most measurements that it is given.
     pub(crate) most: usize,
     /// Seed of the subset.
@@ -20,7 +20,9 @@ pub(crate) struct Thinned {
 }
 
 impl Fit for Thinned {
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
+    type Model = Box<dyn Model>;
+
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         if pairs.len() <= self.most || pairs.len() != values.nrows() {
             return self.method.fit(pairs, values);
         }
@@ -36,8 +38,10 @@ impl Fit for Thinned {
 mod tests {
     use super::*;
     use crate::features::Features;
+    use crate::fit::boxed;
     use crate::link::Link;
     use crate::reference::Neighbours;
+    use elm_datasets::Brdf;
     use elm_datasets::geometry::cartesian;
     use ndarray::Array2;
 
@@ -51,7 +55,7 @@ mod tests {
             .collect();
         let values = Array2::from_shape_fn((50, 1), |(row, _)| row as f64);
         let fit = |most, seed| {
-            let method = Box::new(Neighbours::nearest(Features::Cosines, Link::Identity));
+            let method = boxed(Neighbours::nearest(Features::Cosines, Link::Identity));
             let thinned = Thinned { method, most, seed };
             let model = thinned.fit(&pairs, values.view()).unwrap();
             model.eval(&pairs).unwrap()

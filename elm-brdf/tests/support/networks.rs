@@ -4,16 +4,17 @@ use std::path::PathBuf;
 
 use elm::{Activation, ElmParams, solve::Ridge};
 use elm_brdf::features::Features;
+use elm_brdf::fit::boxed;
 use elm_brdf::link::Link;
 use elm_brdf::model::BrdfParams;
-use elm_brdf::render::Library;
+use elm_brdf::scene_materials::Library;
 
 /// Fitted to CUReT's files in this folder, or to the stand-in.
 pub(crate) fn library(curet: Option<PathBuf>) -> Library {
-    Library {
+    Library::with_network(
         curet,
-        network: Box::new(|_, _| {
-            Box::new(BrdfParams {
+        Box::new(|_| {
+            boxed(BrdfParams {
                 features: Features::ReciprocalCosines,
                 link: Link::default_log(),
                 network: ElmParams::new(40)
@@ -21,5 +22,5 @@ pub(crate) fn library(curet: Option<PathBuf>) -> Library {
                     .solver(Ridge::leave_one_out()),
             })
         }),
-    }
+    )
 }

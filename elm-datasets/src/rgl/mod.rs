@@ -42,11 +42,12 @@ mod warp;
 use std::f64::consts::{FRAC_2_PI, PI, TAU};
 use std::path::Path;
 
-use ndarray::Array2;
+use ndarray::{Array2, ArrayViewMut2};
 
+use crate::brdf::{Brdf, EvalError, check_arguments};
 pub use crate::error::rgl::Problem;
 use crate::geometry::{Pair, half_vector, polar};
-use crate::{Directions, Error, Samples, Sampling, file};
+use crate::{Error, Samples, Sampling, file};
 use tensor::{F32, Field, U8};
 use warp::{Axis, Size, Warp};
 
@@ -195,15 +196,21 @@ impl Rgl {
     /// negative numbers, which become zero as in the authors' program. A spectrum is left as it
     /// is. NaN for azimuths that are not finite.
     #[must_use]
-    pub fn eval(&self, directions: &Directions) -> Vec<f64> {
+    pub fn at(&self, directions: impl Into<Pair>) -> Vec<f64> {
         let mut values = vec![0.0; self.channels.count()];
+        self.write_at(directions.into(), &mut values);
+        values
+    }
+
+    /// `values` has a zero for each channel.
+    fn write_at(&self, pair: Pair, values: &mut [f64]) {
         let Pair {
             incident: light,
             outgoing: viewer,
-        } = directions.into();
+        } = pair;
         let Some(normal) = half_vector(light, viewer).filter(|_| light[2] > 0.0 && viewer[2] > 0.0)
         else {
-            return values;
+            return;
         };
         let ((theta_i, phi_i), (theta_m, phi_m)) = (polar(light), polar(normal));
         let azimuth = (phi_m - phi_i + PI) / TAU;
@@ -214,7 +221,7 @@ impl Rgl {
             let area = self.sigma.at(0, [square(theta_i), (phi_i + PI) / TAU]);
             // Nothing is reflected by what has no area.
             if area <= 0.0 {
-                return values;
+                return;
             }
             self.ndf.at(0, seen) / (4.0 * area)
         } else {
@@ -232,7 +239,6 @@ impl Rgl {
             };
             *value = smooth * highlight / viewer[2];
         }
-        values
     }
 
     /// Evaluates the BRDF at the pairs of directions that `sampling` gives.
@@ -243,7 +249,7 @@ impl Rgl {
         let directions = sampling.directions()?;
         let mut values = Array2::zeros((directions.len(), self.channels.count()));
         for (mut row, pair) in values.rows_mut().into_iter().zip(&directions) {
-            for (to, from) in row.iter_mut().zip(self.eval(pair)) {
+            for (to, from) in row.iter_mut().zip(self.at(pair)) {
                 *to = from;
             }
         }
@@ -252,6 +258,31 @@ impl Rgl {
             values,
             channels: self.channels.names(),
         })
+    }
+}
+
+/// Negative values of a spectrum, which noise leaves, are black.
+impl Brdf for Rgl {
+    fn channels(&self) -> usize {
+        self.channels.count()
+    }
+
+    fn eval_into(
+        &self,
+        pairs: &[Pair],
+        mut values: ArrayViewMut2<'_, f64>,
+    ) -> Result<(), EvalError> {
+        let channels = self.channels.count();
+        check_arguments(pairs, &values, channels)?;
+        let mut found = vec![0.0; channels];
+        for (mut row, pair) in values.rows_mut().into_iter().zip(pairs) {
+            found.fill(0.0);
+            self.write_at(*pair, &mut found);
+            for (to, value) in row.iter_mut().zip(&found) {
+                *to = value.max(0.0);
+            }
+        }
+        Ok(())
     }
 }
 

@@ -161,7 +161,7 @@ pub(super) const RGL: Reader = Reader {
                 theta_o: 0.4,
                 phi_o,
             };
-            let values = material.eval(&pair);
+            let values = material.at(&pair);
             assert_eq!(values.len(), material.channels().count());
             assert!(values.iter().all(|value| value.is_finite()), "{values:?}");
             if *material.channels() == Channels::Rgb {

@@ -9,9 +9,9 @@ use rand::seq::index;
 use super::errors::row_weights;
 use super::many::RIDGE;
 use super::{Drawn, provenance};
-use crate::brdf::{Brdf, Fit, check};
 use crate::error::{Error, Result};
 use crate::features::Features;
+use crate::fit::{Fit, check};
 use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
 use crate::model::{BrdfModel, Layer};
@@ -168,8 +168,10 @@ impl Lean {
 }
 
 impl Fit for Lean {
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
-        Ok(Box::new(self.fit_model(pairs, values)?))
+    type Model = BrdfModel;
+
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+        self.fit_model(pairs, values)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_2};
 
-use elm_datasets::analytic::Angles;
+use elm_datasets::lobes::Cosines;
 
 /// The most shape parameters that a model has.
 pub(super) const MOST_SHAPES: usize = 4;
@@ -10,7 +10,7 @@ pub(super) const MOST_SHAPES: usize = 4;
 pub(super) const MOST_TERMS: usize = 3;
 
 /// An analytic model of reflectance; formulas and sources are those of
-/// [`elm_datasets::analytic`].
+/// [`elm_datasets::lobes`].
 ///
 /// Weights are free but for their sign: albedos above 1 are allowed, as measurements are not
 /// calibrated to better than that. The reflectance $f_0$ of a microfacet surface follows from
@@ -165,7 +165,7 @@ impl Analytic {
     }
 
     /// The value of each term for these shape parameters.
-    pub(super) fn basis(self, angles: &Angles, shapes: &[f64; MOST_SHAPES]) -> [f64; MOST_TERMS] {
+    pub(super) fn basis(self, angles: &Cosines, shapes: &[f64; MOST_SHAPES]) -> [f64; MOST_TERMS] {
         let [first, second, third, fourth] = *shapes;
         match self {
             Self::Lambert => [FRAC_1_PI, 0.0, 0.0],

@@ -4,21 +4,24 @@ mod family;
 mod nonnegative;
 mod search;
 
-use elm_datasets::analytic::Angles;
-use ndarray::{Array2, ArrayView2};
+use elm_datasets::brdf::EvalError;
+use elm_datasets::lobes::Cosines;
+use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 
 pub use family::{Analytic, Shape};
 use family::{MOST_SHAPES, MOST_TERMS};
 use search::Problem;
 
-use crate::brdf::{Brdf, Fit, check, check_directions};
 use crate::error::Result;
+use crate::fit::{Fit, Model, assign, check};
+use elm_datasets::Brdf;
+use elm_datasets::brdf::check_directions;
 use elm_datasets::geometry::Pair;
 
 /// Analytic models with the parameters found for each channel.
 ///
 /// ```
-/// use elm_brdf::brdf::Brdf;
+/// use elm_datasets::Brdf;
 /// use elm_datasets::geometry::{Pair, cartesian};
 /// use elm_brdf::reference::Analytic;
 /// use ndarray::Array2;
@@ -86,14 +89,14 @@ impl Analytic {
         values: ArrayView2<'_, f64>,
     ) -> Result<AnalyticModel> {
         check(pairs, values)?;
-        let above: Vec<(usize, Angles)> = pairs
+        let above: Vec<(usize, Cosines)> = pairs
             .iter()
             .enumerate()
             .filter_map(|(row, pair)| {
-                Some((row, Angles::of_vectors(pair.incident, pair.outgoing)?))
+                Some((row, Cosines::of_vectors(pair.incident, pair.outgoing)?))
             })
             .collect();
-        let angles: Vec<Angles> = above.iter().map(|&(_, angles)| angles).collect();
+        let angles: Vec<Cosines> = above.iter().map(|&(_, angles)| angles).collect();
         let problem = Problem::new(self, &angles);
         let channels = values.columns().into_iter().map(|column| {
             let measured: Vec<f64> = above.iter().map(|&(row, _)| column[row]).collect();
@@ -108,21 +111,19 @@ impl Analytic {
 }
 
 impl Fit for Analytic {
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>> {
-        Ok(Box::new(self.fit_analytic(pairs, values)?))
+    type Model = AnalyticModel;
+
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+        self.fit_analytic(pairs, values)
     }
 }
 
-impl Brdf for AnalyticModel {
-    fn channels(&self) -> usize {
-        self.channels.len()
-    }
-
-    fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
+impl AnalyticModel {
+    fn values_at(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
         check_directions(pairs)?;
         let mut out = Array2::zeros((pairs.len(), self.channels.len()));
         for (mut row, pair) in out.rows_mut().into_iter().zip(pairs) {
-            let Some(angles) = Angles::of_vectors(pair.incident, pair.outgoing) else {
+            let Some(angles) = Cosines::of_vectors(pair.incident, pair.outgoing) else {
                 continue;
             };
             for (value, channel) in row.iter_mut().zip(&self.channels) {
@@ -132,7 +133,19 @@ impl Brdf for AnalyticModel {
         }
         Ok(out)
     }
+}
 
+impl Brdf for AnalyticModel {
+    fn channels(&self) -> usize {
+        self.channels.len()
+    }
+
+    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+        assign(self.values_at(pairs)?, values)
+    }
+}
+
+impl Model for AnalyticModel {
     fn floats_per_channel(&self) -> usize {
         self.family.shapes().len() + self.family.terms().len()
     }

@@ -1,6 +1,6 @@
 //! Shape parameters by a grid of starts and Levenberg and Marquardt's method, weights eliminated.
 
-use elm_datasets::analytic::Angles;
+use elm_datasets::lobes::Cosines;
 
 use super::family::{Analytic, MOST_SHAPES, MOST_TERMS};
 use super::nonnegative::{Normal, solve};
@@ -18,7 +18,7 @@ type Places = [f64; MOST_SHAPES];
 /// What all channels share: the model, the directions, and the grid's terms.
 pub(super) struct Problem<'a> {
     family: Analytic,
-    angles: &'a [Angles],
+    angles: &'a [Cosines],
     grid: Vec<GridPoint>,
 }
 
@@ -39,7 +39,7 @@ struct Fit {
 }
 
 impl<'a> Problem<'a> {
-    pub(super) fn new(family: Analytic, angles: &'a [Angles]) -> Self {
+    pub(super) fn new(family: Analytic, angles: &'a [Cosines]) -> Self {
         let shapes = family.shapes();
         let count = shapes.iter().map(|shape| shape.steps).product();
         let mut problem = Self {

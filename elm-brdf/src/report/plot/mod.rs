@@ -32,10 +32,11 @@ use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
 
 use super::{mean, paper, replace};
-use crate::brdf::{Brdf, Fit};
 use crate::error::{Error, Result};
+use crate::fit::Fit;
 use crate::pareto::Point;
 use crate::protocol::MaterialScores;
+use elm_datasets::Brdf;
 use elm_datasets::geometry::{self, Pair};
 
 pub(super) const BLUE: RGBColor = RGBColor(0, 114, 178);
@@ -168,7 +169,7 @@ pub fn write_fitted_lobes(
     dir: &Path,
     title: &str,
     data: &Measurements,
-    method: &dyn Fit,
+    method: &(impl Fit + ?Sized),
 ) -> Result<Vec<PathBuf>> {
     let mut fitted = Vec::new();
     for (index, material) in data.materials.iter().take(MOST_PANELS).enumerate() {
@@ -183,7 +184,7 @@ pub fn write_fitted_lobes(
         .iter()
         .map(|(material, pairs, model)| Panel {
             name: format!("{} {}", material.id, material.name),
-            model: model.as_ref(),
+            model,
             channels: 0..material.values.ncols(),
             pairs,
             measured: material.values.view(),
@@ -326,7 +327,7 @@ mod tests {
         let model = Analytic::GgxLambert.fit(&pairs, values.view()).unwrap();
         let panel = Panel {
             name: "a panel".to_owned(),
-            model: model.as_ref(),
+            model: &model,
             channels: 0..3,
             pairs: &pairs,
             measured: values.view(),

@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use super::environment::{Environment, LightSample};
-use super::shape::Form;
-use super::vector::{BLACK, Rgb, Vec3, scaled};
+use crate::environment::{Environment, LightSample};
+use crate::shape::Form;
+use crate::vector::{BLACK, Rgb, Vec3, scaled};
 
 /// A light.
 #[derive(Debug, Clone)]

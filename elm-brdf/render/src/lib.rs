@@ -1,7 +1,7 @@
 //! Pictures of scenes with learnt materials, and the account of the work done and skipped.
 //!
 //! A [`Scene`] is read from TOML; [`render`] checks it, reads its files and traces it. Materials
-//! come from a [`Supply`], each on first need. Paths travel in waves: at each surface the
+//! come from a [`MaterialLoader`], each on first need. Paths travel in waves: at each surface the
 //! evaluations of all paths of a tile are gathered, sorted by material and carried out together,
 //! so that a network sees long batches. Light is sampled both from the lights and from the
 //! material, and both are combined by multiple importance sampling.
@@ -14,16 +14,18 @@
 //! A ray that leaves the scene has no material to evaluate, so pixels off the geometry cost
 //! nothing with or without savings.
 
+#![forbid(unsafe_code)]
+
 mod account;
 mod batch;
-mod builtin;
 mod bvh;
 mod camera;
 mod distribution;
 mod environment;
-pub(crate) mod error;
+mod error;
 mod film;
 mod light;
+mod loader;
 mod material;
 mod mesh;
 mod picture;
@@ -33,22 +35,18 @@ pub mod scene;
 mod shape;
 mod sheet;
 mod shelf;
-mod supply;
 mod together;
 mod tracer;
 mod vector;
 mod world;
 
 pub use account::{Account, Savings, Seconds, Work};
-pub use builtin::{NAMES as BUILTIN_NAMES, builtin};
-pub use error::{MeshProblem, Place, SceneError};
+pub use error::{Error, MeshProblem, Place, Result};
+pub use loader::{LoadError, LoadedMaterial, MaterialLoader};
 pub use material::Material;
 pub use picture::Bitmap;
 pub use scene::Scene;
 pub use sheet::{Content, Panel, Sheet};
-pub use supply::{Analytic, Library, Recipe, Supplied, Supply, default_network};
-
-use crate::error::Result;
 
 /// How to render, beside what the scene says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,21 +89,19 @@ pub struct Rendering {
     pub account: Account,
 }
 
-/// Renders a scene with materials from `supply`. `progress` is told now and then how many of the
+/// Renders a scene with materials from `loader`. `progress` is told now and then how many of the
 /// samples are done, from any thread.
 ///
 /// # Errors
-/// [`crate::Error::Scene`] for a scene that cannot be, naming file and line; whatever `supply` and
+/// [`Error`] for a scene that cannot be, naming file and line; whatever `loader` and
 /// the models report.
-pub fn render(
-    scene: &Scene,
-    supply: &dyn Supply,
+pub fn render<M: Sync>(
+    scene: &Scene<M>,
+    loader: &dyn MaterialLoader<M>,
     options: Options,
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<Rendering> {
-    let mut rendered = together::render(&[scene], &[], supply, options, progress)?;
+    let mut rendered = together::render(&[scene], &[], loader, options, progress)?;
     // One for each scene.
-    rendered
-        .pop()
-        .ok_or_else(|| SceneError::Sheet { panel: 0 }.into())
+    rendered.pop().ok_or(Error::Sheet { panel: 0 })
 }

@@ -8,19 +8,19 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use rayon::prelude::*;
+use toml::Spanned;
 
-use super::account::{Reason, Savings, Tally};
-use super::batch::Batch;
-use super::error::SceneError;
-use super::film::Film;
-use super::scene::{Image, Scene};
-use super::shelf::Shelf;
-use super::supply::Supply;
-use super::tracer::{Sample, Tracer};
-use super::vector::Vec3;
-use super::world::World;
-use super::{Options, Rendering};
-use crate::error::Result;
+use crate::account::{Reason, Savings, Tally};
+use crate::batch::Batch;
+use crate::error::{Error, Result};
+use crate::film::Film;
+use crate::loader::MaterialLoader;
+use crate::scene::{Image, Scene, Sphere};
+use crate::shelf::Shelf;
+use crate::tracer::{Sample, Tracer};
+use crate::vector::Vec3;
+use crate::world::World;
+use crate::{Options, Rendering};
 
 /// What any bounded saving may cost, in display steps.
 const STEPS: f64 = 0.5;
@@ -43,10 +43,10 @@ pub(crate) struct Difference {
 }
 
 /// Renders scenes of one size, of which some differences will be shown, too.
-pub(crate) fn render(
-    scenes: &[&Scene],
+pub(crate) fn render<M: Sync>(
+    scenes: &[&Scene<M>],
     differences: &[Difference],
-    supply: &dyn Supply,
+    loader: &dyn MaterialLoader<M>,
     options: Options,
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<Vec<Rendering>> {
@@ -58,7 +58,7 @@ pub(crate) fn render(
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
-        .map_err(|reason| SceneError::Threads {
+        .map_err(|reason| Error::Threads {
             threads,
             reason: reason.to_string(),
         })?;
@@ -75,7 +75,7 @@ pub(crate) fn render(
         .collect::<Result<Vec<_>, _>>()?;
     let shelves: Vec<Shelf<'_>> = scenes
         .iter()
-        .map(|scene| Shelf::new(scene, supply))
+        .map(|scene| Shelf::new(scene, loader))
         .collect();
     if !savings.materials {
         shelves.iter().try_for_each(Shelf::fill)?;
@@ -116,22 +116,22 @@ impl<'a> Group<'a> {
         pictures: Vec<Picture<'a>>,
         differences: &[Difference],
         savings: Savings,
-    ) -> Result<Self, SceneError> {
+    ) -> Result<Self> {
         let size = |picture: &Picture<'_>| {
-            let image = &picture.scene.image;
+            let image = picture.image;
             (image.width, image.height)
         };
         let Some(first) = pictures.first() else {
-            return Err(SceneError::Sheet { panel: 0 });
+            return Err(Error::Sheet { panel: 0 });
         };
         let (width, height) = size(first);
         if let Some(panel) = pictures.iter().position(|p| size(p) != (width, height)) {
-            return Err(SceneError::Sheet { panel });
+            return Err(Error::Sheet { panel });
         }
         Ok(Self {
             width,
             height,
-            samples: first.scene.image.samples,
+            samples: first.image.samples,
             stop: savings.samples,
             // Only for stopping.
             differences: differences
@@ -235,7 +235,8 @@ impl<'a> Group<'a> {
 
 /// A picture in the making.
 struct Picture<'a> {
-    scene: &'a Scene,
+    image: &'a Image,
+    spheres: &'a [Spanned<Sphere>],
     tracer: Tracer<'a>,
     film: Mutex<Film>,
     tally: Mutex<Tally>,
@@ -243,8 +244,8 @@ struct Picture<'a> {
 
 impl<'a> Picture<'a> {
     /// `enlarged` is the factor on its errors of what is shown of it.
-    fn new(
-        scene: &'a Scene,
+    fn new<M>(
+        scene: &'a Scene<M>,
         world: &'a World,
         shelf: &'a Shelf<'a>,
         savings: Savings,
@@ -253,7 +254,8 @@ impl<'a> Picture<'a> {
         let image = &scene.image;
         let gain = image.exposure.exp2();
         Self {
-            scene,
+            image,
+            spheres: &scene.sphere,
             tracer: Tracer {
                 world,
                 shelf,
@@ -303,7 +305,7 @@ impl<'a> Picture<'a> {
     }
 
     fn finish(self) -> Rendering {
-        let image = &self.scene.image;
+        let image = self.image;
         let labels = self.labels();
         let film = self
             .film
@@ -316,7 +318,7 @@ impl<'a> Picture<'a> {
         let shelf = self.tracer.shelf;
         let materials: Vec<(&str, Option<usize>)> = shelf
             .stocked()
-            .map(|(name, stocked)| (name, stocked.map(|s| s.material.multiply_adds())))
+            .map(|(name, stocked)| (name, stocked.map(|s| s.multiply_adds)))
             .collect();
         let mut account = tally.account(&materials);
         account.savings = Some(self.tracer.savings);
@@ -363,8 +365,7 @@ impl<'a> Picture<'a> {
     /// The labels of spheres, a little below each.
     fn labels(&self) -> Vec<(String, [f64; 2])> {
         let camera = &self.tracer.world.camera;
-        self.scene
-            .sphere
+        self.spheres
             .iter()
             .filter_map(|entry| {
                 let sphere = entry.get_ref();

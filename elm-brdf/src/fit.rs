@@ -1,29 +1,18 @@
-//! What every reflectance model here can do, and what can make one from measurements.
+//! What is fitted to measurements, and what comes of it.
 
-use std::any::Any;
-
-use ndarray::{Array2, ArrayView2, Axis};
+use elm_datasets::Brdf;
+use elm_datasets::brdf::{ArgumentError, EvalError};
+use elm_datasets::geometry::Pair;
+use ndarray::{Array2, ArrayView2, ArrayViewMut2, Axis};
 
 use crate::error::{Error, Result};
-use elm_datasets::geometry::Pair;
 
-/// A reflectance model, possibly of several channels, or of several materials side by side.
-///
-/// The value of one pair does not depend on the other pairs of a batch, bit for bit.
-pub trait Brdf: Any + Send + Sync {
-    /// Number of values per pair of directions.
-    fn channels(&self) -> usize;
-
+/// A fitted reflectance model: a [`Brdf`] that says what it costs.
+pub trait Model: Brdf {
     /// Multiplications and additions that one pair costs in matrix products; 0 for a formula.
     fn multiply_adds(&self) -> usize {
         0
     }
-
-    /// BRDF in 1/sr, without the cosine, at each pair of directions: shape (pairs, channels).
-    ///
-    /// # Errors
-    /// Where a value cannot be computed, such as for a direction that is not finite.
-    fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>>;
 
     /// Numbers that must be stored to evaluate one channel, the largest where channels differ:
     /// coefficients, scales and measurements kept, but nothing that a seed regenerates.
@@ -36,8 +25,25 @@ pub trait Brdf: Any + Send + Sync {
     }
 }
 
-/// A way to make a [`Brdf`] from measurements.
-pub trait Fit {
+impl<M: Model + ?Sized> Model for Box<M> {
+    fn multiply_adds(&self) -> usize {
+        (**self).multiply_adds()
+    }
+
+    fn floats_per_channel(&self) -> usize {
+        (**self).floats_per_channel()
+    }
+
+    fn stored_floats(&self) -> usize {
+        (**self).stored_floats()
+    }
+}
+
+/// A way to make a [`Model`] from measurements.
+pub trait Fit: Send + Sync {
+    /// What it makes.
+    type Model: Model;
+
     /// Fits `values` (BRDF in 1/sr, shape (pairs, channels)) measured at `pairs`.
     ///
     /// Channels are independent of each other and may be those of many materials: what they
@@ -45,7 +51,7 @@ pub trait Fit {
     ///
     /// # Errors
     /// Where these measurements cannot be fitted.
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Box<dyn Brdf>>;
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model>;
 
     /// What the fit without each fold predicts at **all** pairs, those of the fold and those that
     /// it was fitted to: one array of shape (pairs, channels) per fold. `folds` has the fold of
@@ -76,6 +82,35 @@ pub trait Fit {
     }
 }
 
+/// Any method, whose models are of types that differ.
+pub type AnyFit = dyn Fit<Model = Box<dyn Model>>;
+
+/// A method as one of [any](AnyFit) type.
+pub fn boxed<F: Fit + 'static>(method: F) -> Box<AnyFit> {
+    Box::new(Boxed(method))
+}
+
+struct Boxed<F>(F);
+
+impl<F: Fit + 'static> Fit for Boxed<F> {
+    type Model = Box<dyn Model>;
+
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+        Ok(Box::new(self.0.fit(pairs, values)?))
+    }
+
+    fn cross_fits(
+        &self,
+        pairs: &[Pair],
+        values: ArrayView2<'_, f64>,
+        folds: &[usize],
+        count: usize,
+        done: &mut dyn FnMut(usize),
+    ) -> Result<Vec<Array2<f64>>> {
+        self.0.cross_fits(pairs, values, folds, count, done)
+    }
+}
+
 /// What every method asks of measurements: at least one, one row of values per pair of
 /// directions, and all numbers finite.
 pub(crate) fn check(pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<()> {
@@ -100,20 +135,20 @@ pub(crate) fn check(pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<()> {
             column,
         });
     }
-    check_directions(pairs)
+    Ok(elm_datasets::brdf::check_directions(pairs)?)
 }
 
-/// All components finite; in the error, columns count those of the light, then the viewer's.
-pub(crate) fn check_directions(pairs: &[Pair]) -> Result<()> {
-    for (row, pair) in pairs.iter().enumerate() {
-        let mut components = pair.incident.iter().chain(&pair.outgoing);
-        if let Some(column) = components.position(|c| !c.is_finite()) {
-            return Err(Error::NotFinite {
-                what: "directions",
-                row,
-                column,
-            });
-        }
+/// Puts values that were computed where [`Brdf::eval_into`] wants them.
+pub(crate) fn assign(
+    found: Array2<f64>,
+    mut values: ArrayViewMut2<'_, f64>,
+) -> Result<(), EvalError> {
+    if found.dim() != values.dim() {
+        return Err(EvalError::new(ArgumentError::Shape {
+            expected: found.dim(),
+            found: values.dim(),
+        }));
     }
+    values.assign(&found);
     Ok(())
 }

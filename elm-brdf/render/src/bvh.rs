@@ -6,8 +6,8 @@ use bvh::bounding_hierarchy::BHShape;
 use bvh::bvh::{Bvh, BvhNode};
 use nalgebra::Point3;
 
-use super::shape::{Form, Meeting, Ray};
-use super::vector::Vec3;
+use crate::shape::{Form, Meeting, Ray};
+use crate::vector::Vec3;
 
 /// Forms in a hierarchy of boxes; those without bounds beside it.
 pub(crate) struct Hierarchy {

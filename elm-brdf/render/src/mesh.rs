@@ -3,27 +3,27 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use super::error::{MeshProblem, SceneError};
-use super::shape::Triangle;
-use super::vector::Vec3;
+use crate::error::{Error, MeshProblem, Result};
+use crate::shape::Triangle;
+use crate::vector::Vec3;
 
 /// Most triangles of one mesh; they take about half a gigabyte.
 pub(crate) const MAX_TRIANGLES: usize = 2_000_000;
 
 /// Reads an OBJ file. Polygons become triangles, triangles without area are left out, and where
 /// the file has no normals the triangles stay flat.
-pub(crate) fn read(path: &Path) -> Result<Vec<Triangle>, SceneError> {
+pub(crate) fn read(path: &Path) -> Result<Vec<Triangle>> {
     let options = tobj::LoadOptions {
         triangulate: true,
         ignore_points: true,
         ignore_lines: true,
         ..tobj::LoadOptions::default()
     };
-    let file = std::fs::File::open(path).map_err(|reason| SceneError::Read {
+    let file = std::fs::File::open(path).map_err(|reason| Error::Read {
         path: path.to_owned(),
         reason,
     })?;
-    let wrong = |problem| SceneError::Mesh {
+    let wrong = |problem| Error::Mesh {
         path: path.to_owned(),
         problem,
     };
@@ -165,7 +165,7 @@ mod tests {
     use super::*;
     use std::io::Write;
 
-    fn read_text(text: &str) -> Result<Vec<Triangle>, SceneError> {
+    fn read_text(text: &str) -> Result<Vec<Triangle>> {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         file.write_all(text.as_bytes()).unwrap();
         read(file.path())
@@ -201,7 +201,7 @@ mod tests {
         }
         assert!(matches!(
             read("nowhere.obj".as_ref()),
-            Err(SceneError::Read { .. })
+            Err(Error::Read { .. })
         ));
     }
 

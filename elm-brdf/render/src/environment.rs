@@ -3,9 +3,9 @@
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
-use super::distribution::Distribution2;
-use super::error::SceneError;
-use super::vector::{Frame, Rgb, Vec3, largest, luminance, scaled, times};
+use crate::distribution::Distribution2;
+use crate::error::{Error, Result};
+use crate::vector::{Frame, Rgb, Vec3, largest, luminance, scaled, times};
 use elm_datasets::geometry::Vector;
 
 /// Most pixels of a picture of the environment.
@@ -90,15 +90,15 @@ pub(crate) fn cosine_weighted([a, b]: [f64; 2]) -> Vector {
 
 impl Panorama {
     /// Reads OpenEXR or Radiance HDR (or any picture that the decoder knows).
-    pub(crate) fn read(path: &Path, rotation: f64) -> Result<Self, SceneError> {
-        let wrong = |reason: String| SceneError::Picture {
+    pub(crate) fn read(path: &Path, rotation: f64) -> Result<Self> {
+        let wrong = |reason: String| Error::Picture {
             path: path.to_owned(),
             reason,
         };
         let open = || {
             image::ImageReader::open(path)
                 .and_then(image::ImageReader::with_guessed_format)
-                .map_err(|reason| SceneError::Read {
+                .map_err(|reason| Error::Read {
                     path: path.to_owned(),
                     reason,
                 })

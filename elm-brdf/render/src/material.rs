@@ -2,10 +2,10 @@
 
 use ndarray::Array2;
 
-use super::proxy::{Proxy, Survey};
-use super::vector::{Rgb, largest, luminance, scaled, times};
-use crate::brdf::Brdf;
 use crate::error::{Error, Result};
+use crate::proxy::{Proxy, Survey};
+use crate::vector::{Rgb, largest, luminance, scaled, times};
+use elm_datasets::Brdf;
 use elm_datasets::geometry::{Pair, Vector};
 
 /// A model may pass the largest value of its [`Survey`] by this factor; beyond, it is cut off.
@@ -19,15 +19,16 @@ const CEILING_MARGIN: f64 = 2.0;
 ///
 /// ```
 /// use elm_datasets::geometry::{Pair, cartesian};
-/// use elm_brdf::render::{Analytic, Material};
-/// let chalk = Material::new(Box::new(Analytic::lambert(0.8)), [1.0; 3], false)?;
+/// use elm_brdf_render::Material;
+/// use elm_datasets::lobes::Formula;
+/// let chalk = Material::new(Box::new(Formula::lambert(0.8)?), [1.0; 3], false)?;
 /// let outgoing = cartesian(0.5, 0.0);
 /// let (incident, density) = chalk.sample(outgoing, [0.3, 0.7]);
 /// assert!((chalk.pdf(outgoing, incident) / density - 1.0).abs() < 1e-9);
 /// let value = chalk.eval(&[Pair { incident, outgoing }])?[0][0];
 /// assert!((value - 0.8 / std::f64::consts::PI).abs() < 1e-12);
 /// assert!((chalk.albedo()[0].1 - 0.8).abs() < 0.01);
-/// # Ok::<(), elm_brdf::Error>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Material {
     brdf: Box<dyn Brdf>,
@@ -45,12 +46,15 @@ impl Material {
     /// is scaled down so that no directional albedo passes 1.
     ///
     /// # Errors
-    /// [`Error::Channels`] for a model of another number of channels; whatever the model's own
+    /// [`Error::Channels`] for a model of another number of channels, [`Error::Tint`]; whatever the model's own
     /// evaluation reports.
     pub fn new(brdf: Box<dyn Brdf>, tint: Rgb, conserve_energy: bool) -> Result<Self> {
         let channels = brdf.channels();
         if channels != 1 && channels != 3 {
             return Err(Error::Channels { channels });
+        }
+        if !tint.iter().all(|c| (0.0..=1e6).contains(c)) {
+            return Err(Error::Tint { found: tint });
         }
         let survey = Survey::new();
         let raw =
@@ -148,12 +152,6 @@ impl Material {
     #[must_use]
     pub fn channels(&self) -> usize {
         self.brdf.channels()
-    }
-
-    /// Multiplications and additions of one evaluation.
-    #[must_use]
-    pub fn multiply_adds(&self) -> usize {
-        self.brdf.multiply_adds()
     }
 }
 

@@ -12,10 +12,8 @@ use embedded_graphics::prelude::{Pixel, Point};
 use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
 use image::{ExtendedColorType, ImageEncoder, ImageFormat};
 
-use super::Rendering;
-use super::error::SceneError;
+use crate::Rendering;
 use crate::error::{Error, Result};
-use crate::file;
 
 /// A picture in 8-bit sRGB.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -159,11 +157,11 @@ impl Bitmap {
         draw(0, 0, Rgb888::new(240, 240, 240));
     }
 
-    /// Writes a PNG file, whole or not at all.
+    /// The bytes of a PNG file.
     ///
     /// # Errors
-    /// [`Error::Write`] naming the file.
-    pub fn write_png(&self, path: &Path) -> Result<()> {
+    /// [`Error::Encode`].
+    pub fn png(&self) -> Result<Vec<u8>> {
         let mut png = Vec::new();
         image::codecs::png::PngEncoder::new(&mut png)
             .write_image(
@@ -172,38 +170,38 @@ impl Bitmap {
                 self.height,
                 ExtendedColorType::Rgb8,
             )
-            .map_err(|error| unwritten(path, std::io::Error::other(error)))?;
-        file::replace(path, &png)
+            .map_err(not_encoded)?;
+        Ok(png)
     }
 }
 
 impl Rendering {
-    /// Writes the picture, whole or not at all: `.png` in sRGB with its words, `.exr` in linear
-    /// radiance without.
+    /// The bytes of a picture file in one of the formats that [`format`](Self::format) gives: PNG in sRGB
+    /// with its words, or OpenEXR in linear radiance without.
     ///
     /// # Errors
-    /// [`SceneError::PictureFormat`] for another extension, [`Error::Write`] naming the file.
-    pub fn write(&self, path: &Path) -> Result<()> {
-        match Self::format(path)? {
-            ImageFormat::OpenExr => self.write_exr(path),
-            _ => Bitmap::captioned(self).write_png(path),
+    /// [`Error::Encode`].
+    pub fn encode(&self, format: ImageFormat) -> Result<Vec<u8>> {
+        match format {
+            ImageFormat::OpenExr => self.exr(),
+            _ => Bitmap::captioned(self).png(),
         }
     }
 
     /// The format that a file's extension asks for, so that a wrong one is told before the work.
     ///
     /// # Errors
-    /// [`SceneError::PictureFormat`].
-    pub fn format(path: &Path) -> Result<ImageFormat, SceneError> {
+    /// [`Error::PictureFormat`].
+    pub fn format(path: &Path) -> Result<ImageFormat> {
         match ImageFormat::from_path(path) {
             Ok(format @ (ImageFormat::Png | ImageFormat::OpenExr)) => Ok(format),
-            _ => Err(SceneError::PictureFormat {
+            _ => Err(Error::PictureFormat {
                 path: path.to_owned(),
             }),
         }
     }
 
-    fn write_exr(&self, path: &Path) -> Result<()> {
+    fn exr(&self) -> Result<Vec<u8>> {
         let bytes: Vec<u8> = self
             .pixels
             .iter()
@@ -213,15 +211,14 @@ impl Rendering {
         let mut exr = Cursor::new(Vec::new());
         image::codecs::openexr::OpenExrEncoder::new(&mut exr)
             .write_image(&bytes, self.width, self.height, ExtendedColorType::Rgb32F)
-            .map_err(|error| unwritten(path, std::io::Error::other(error)))?;
-        file::replace(path, exr.get_ref())
+            .map_err(not_encoded)?;
+        Ok(exr.into_inner())
     }
 }
 
-fn unwritten(path: &Path, reason: std::io::Error) -> Error {
-    Error::Write {
-        path: path.to_owned(),
-        reason,
+fn not_encoded(error: image::ImageError) -> Error {
+    Error::Encode {
+        reason: error.to_string(),
     }
 }
 

@@ -2,8 +2,6 @@
 
 use std::path::PathBuf;
 
-use thiserror::Error;
-
 /// A place in a scene file: its name and, where known, the line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
@@ -22,10 +20,13 @@ impl std::fmt::Display for Place {
     }
 }
 
+/// Result of everything in this crate that can fail.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
 /// Why a scene could not be read or rendered.
-#[derive(Debug, Error)]
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum SceneError {
+pub enum Error {
     /// A file could not be opened or read.
     #[error("cannot read {}: {reason}", path.display())]
     Read {
@@ -124,6 +125,27 @@ pub enum SceneError {
         /// Why not.
         reason: Box<dyn std::error::Error + Send + Sync>,
     },
+    /// A model with a number of channels that is no colour.
+    #[error("a model of {channels} channels cannot be rendered: expected 1 or 3")]
+    Channels {
+        /// Its channels.
+        channels: usize,
+    },
+    /// A colour to multiply a material by that is none.
+    #[error("tint is {found:?}, expected three numbers from 0 to 1e6")]
+    Tint {
+        /// What was found.
+        found: [f64; 3],
+    },
+    /// A reflectance could not be evaluated.
+    #[error(transparent)]
+    Evaluation(#[from] elm_datasets::brdf::EvalError),
+    /// A picture could not be encoded.
+    #[error("cannot encode the picture: {reason}")]
+    Encode {
+        /// What the encoder said.
+        reason: String,
+    },
     /// A worker thread pool could not be started.
     #[error("cannot start {threads} threads: {reason}")]
     Threads {
@@ -135,7 +157,7 @@ pub enum SceneError {
 }
 
 /// What is wrong with a mesh.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshProblem {
     /// Not an OBJ file.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::distribution::Distribution2;
+use crate::distribution::Distribution2;
 use elm_datasets::geometry::{Pair, Vector, cartesian};
 
 /// Viewing angles of the table.

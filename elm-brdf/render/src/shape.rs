@@ -1,6 +1,6 @@
 //! Rays, and what they meet: spheres, planes, parallelograms and triangles.
 
-use super::vector::Vec3;
+use crate::vector::Vec3;
 
 /// A half-line.
 #[derive(Debug, Clone, Copy)]

@@ -3,21 +3,22 @@
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
-use super::error::SceneError;
-use super::material::Material;
-use super::scene::Scene;
-use super::supply::Supply;
-use crate::error::{Error, Result};
+use crate::loader::{LoadError, LoadedMaterial, MaterialLoader};
+use crate::material::Material;
+use crate::scene::Scene;
+
+use crate::error::{Error, Place, Result};
 
 /// Materials by their index in the scene, in alphabetical order.
 pub(crate) struct Shelf<'a> {
-    scene: &'a Scene,
-    supply: &'a dyn Supply,
     slots: Vec<Slot<'a>>,
 }
 
 struct Slot<'a> {
     name: &'a str,
+    load: Box<dyn Fn() -> Result<LoadedMaterial, LoadError> + Sync + 'a>,
+    /// Where the scene describes it.
+    place: Place,
     material: OnceLock<Stocked>,
     /// Held while the material is made, so that it is made once.
     making: Mutex<()>,
@@ -26,6 +27,8 @@ struct Slot<'a> {
 /// A material that has been made.
 pub(crate) struct Stocked {
     pub(crate) material: Material,
+    /// Of one evaluation.
+    pub(crate) multiply_adds: usize,
     pub(crate) origin: String,
     /// What the data call it.
     pub(crate) title: Option<String>,
@@ -36,20 +39,16 @@ pub(crate) struct Stocked {
 }
 
 impl<'a> Shelf<'a> {
-    pub(crate) fn new(scene: &'a Scene, supply: &'a dyn Supply) -> Self {
-        let slot = |name| Slot {
+    pub(crate) fn new<M: Sync>(scene: &'a Scene<M>, loader: &'a dyn MaterialLoader<M>) -> Self {
+        let slots = scene.material.iter().map(|(name, table)| Slot {
             name,
+            load: Box::new(|| loader.load(table.get_ref(), &scene.beside("".as_ref()))),
+            place: scene.place(table),
             material: OnceLock::new(),
             making: Mutex::new(()),
-        };
+        });
         Self {
-            scene,
-            supply,
-            slots: scene
-                .material
-                .keys()
-                .map(|name| slot(name.as_str()))
-                .collect(),
+            slots: slots.collect(),
         }
     }
 
@@ -64,50 +63,13 @@ impl<'a> Shelf<'a> {
         if let Some(stocked) = slot.material.get() {
             return Ok(&stocked.material);
         }
-        let made = self.make(slot.name)?;
+        let made = slot.make()?;
         Ok(&slot.material.get_or_init(|| made).material)
     }
 
     /// Makes every material.
     pub(crate) fn fill(&self) -> Result<()> {
         (0..self.slots.len()).try_for_each(|index| self.get(index).map(drop))
-    }
-
-    fn make(&self, name: &str) -> Result<Stocked> {
-        let start = Instant::now();
-        let entry = &self.scene.material[name];
-        let definition = entry.get_ref();
-        let dir = self.scene.beside("".as_ref());
-        let make = || -> Result<Stocked> {
-            let tint = definition.tint.unwrap_or([1.0; 3]);
-            if !tint.iter().all(|c| (0.0..=1e6).contains(c)) {
-                return Err(SceneError::Value {
-                    place: self.scene.place(entry),
-                    what: "tint",
-                    found: format!("{tint:?}"),
-                    expected: "three numbers from 0 to 1e6",
-                }
-                .into());
-            }
-            let supplied = self.supply.supply(definition, &dir)?;
-            let material = Material::new(supplied.brdf, tint, definition.conserve_energy)?;
-            Ok(Stocked {
-                material,
-                origin: supplied.origin,
-                title: supplied.name,
-                notes: supplied.notes,
-                seconds: start.elapsed().as_secs_f64(),
-            })
-        };
-        make().map_err(|reason| match reason {
-            Error::Scene(reason) => Error::Scene(reason),
-            reason => SceneError::Material {
-                place: self.scene.place(entry),
-                name: name.to_owned(),
-                reason: Box::new(reason),
-            }
-            .into(),
-        })
     }
 
     /// Those made so far, in alphabetical order.
@@ -134,5 +96,27 @@ impl<'a> Shelf<'a> {
         origins.sort_unstable();
         origins.dedup();
         origins
+    }
+}
+
+impl Slot<'_> {
+    fn make(&self) -> Result<Stocked> {
+        let start = Instant::now();
+        let make = || -> Result<Stocked, LoadError> {
+            let loaded = (self.load)()?;
+            Ok(Stocked {
+                multiply_adds: loaded.multiply_adds,
+                material: Material::new(loaded.brdf, loaded.tint, loaded.conserve_energy)?,
+                origin: loaded.origin,
+                title: loaded.name,
+                notes: loaded.notes,
+                seconds: start.elapsed().as_secs_f64(),
+            })
+        };
+        make().map_err(|reason| Error::Material {
+            place: self.place.clone(),
+            name: self.name.to_owned(),
+            reason,
+        })
     }
 }

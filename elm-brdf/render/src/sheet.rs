@@ -1,20 +1,19 @@
 //! Several pictures as one.
 
-use super::account::Account;
-use super::error::SceneError;
-use super::scene::Scene;
-use super::supply::Supply;
-use super::together::{self, Difference};
-use super::{Options, Rendering};
-use crate::error::Result;
+use crate::account::Account;
+use crate::error::{Error, Result};
+use crate::loader::MaterialLoader;
+use crate::scene::Scene;
+use crate::together::{self, Difference};
+use crate::{Options, Rendering};
 
 /// Pictures of one size in rows and columns, rendered as one picture.
 #[derive(Debug, Clone)]
-pub struct Sheet {
+pub struct Sheet<M> {
     /// Pictures in a row.
     pub columns: usize,
     /// Row by row.
-    pub panels: Vec<Panel>,
+    pub panels: Vec<Panel<M>>,
     /// Words at the foot, with `{data}` for where the materials come from, and `{name}` for what
     /// those of the first panel are called.
     pub caption: String,
@@ -22,18 +21,18 @@ pub struct Sheet {
 
 /// One picture of a sheet.
 #[derive(Debug, Clone)]
-pub struct Panel {
+pub struct Panel<M> {
     /// Words at its head, with `{name}` for the name of its only material.
     pub title: String,
     /// What it shows.
-    pub content: Content,
+    pub content: Content<M>,
 }
 
 /// What a panel shows.
 #[derive(Debug, Clone)]
-pub enum Content {
+pub enum Content<M> {
     /// A scene.
-    Scene(Box<Scene>),
+    Scene(Box<Scene<M>>),
     /// How two panels before it differ: `factor` times the absolute difference of radiance.
     Difference {
         /// Index of one panel.
@@ -45,9 +44,9 @@ pub enum Content {
     },
 }
 
-impl From<Scene> for Sheet {
+impl<M> From<Scene<M>> for Sheet<M> {
     /// A sheet with nothing else on it.
-    fn from(scene: Scene) -> Self {
+    fn from(scene: Scene<M>) -> Self {
         Self {
             columns: 1,
             caption: scene.image.caption.clone(),
@@ -59,9 +58,9 @@ impl From<Scene> for Sheet {
     }
 }
 
-impl Sheet {
+impl<M> Sheet<M> {
     /// The scenes on it.
-    pub fn scenes(&mut self) -> impl Iterator<Item = &mut Scene> {
+    pub fn scenes(&mut self) -> impl Iterator<Item = &mut Scene<M>> {
         self.panels
             .iter_mut()
             .filter_map(|panel| match &mut panel.content {
@@ -83,14 +82,17 @@ impl Sheet {
     /// the first.
     ///
     /// # Errors
-    /// As [`render`](super::render); [`SceneError::Sheet`] for panels of different sizes, and for a difference
+    /// As [`render`](super::render); [`Error::Sheet`] for panels of different sizes, and for a difference
     /// from a panel that is no scene before it.
     pub fn render(
         &self,
-        supply: &dyn Supply,
+        loader: &dyn MaterialLoader<M>,
         options: Options,
         progress: &(dyn Fn(u64, u64) + Sync),
-    ) -> Result<Rendering> {
+    ) -> Result<Rendering>
+    where
+        M: Sync,
+    {
         let groups = self.groups()?;
         let count = groups
             .iter()
@@ -104,9 +106,9 @@ impl Sheet {
         } in groups
         {
             let here = scenes.len() as u64;
-            let (places, scenes): (Vec<usize>, Vec<&Scene>) = scenes.into_iter().unzip();
+            let (places, scenes): (Vec<usize>, Vec<&Scene<M>>) = scenes.into_iter().unzip();
             let renderings =
-                together::render(&scenes, &differences, supply, options, &|part, whole| {
+                together::render(&scenes, &differences, loader, options, &|part, whole| {
                     // Panels of one size take about as long as each other.
                     let each = whole / here;
                     progress(before * each + part, count * each);
@@ -121,18 +123,18 @@ impl Sheet {
                 // Groups were made of what there is.
                 let panels = (done.get(of), done.get(from));
                 let (Some(Some(a)), Some(Some(b))) = panels else {
-                    return Err(SceneError::Sheet { panel: index }.into());
+                    return Err(Error::Sheet { panel: index });
                 };
                 done[index] = Some(difference(a, b, factor));
             }
         }
         let done: Vec<Rendering> = done.into_iter().flatten().collect();
-        Ok(self.compose(&done)?)
+        self.compose(&done)
     }
 
     /// The scenes by panel, those together whose differences are shown.
-    fn groups(&self) -> Result<Vec<Group<'_>>, SceneError> {
-        let mut groups: Vec<Group<'_>> = Vec::new();
+    fn groups(&self) -> Result<Vec<Group<'_, M>>> {
+        let mut groups: Vec<Group<'_, M>> = Vec::new();
         for (index, panel) in self.panels.iter().enumerate() {
             match &panel.content {
                 Content::Scene(scene) => groups.push(Group {
@@ -141,8 +143,9 @@ impl Sheet {
                 }),
                 Content::Difference { of, from, factor } => {
                     let group = |panel: &usize| {
-                        let holds = |group: &Group<'_>| group.scenes.iter().any(|s| s.0 == *panel);
-                        let sheet = SceneError::Sheet { panel: index };
+                        let holds =
+                            |group: &Group<'_, M>| group.scenes.iter().any(|s| s.0 == *panel);
+                        let sheet = Error::Sheet { panel: index };
                         groups.iter().position(holds).ok_or(sheet)
                     };
                     let (a, b) = (group(of)?, group(from)?);
@@ -163,14 +166,14 @@ impl Sheet {
         Ok(groups)
     }
 
-    fn compose(&self, panels: &[Rendering]) -> Result<Rendering, SceneError> {
+    fn compose(&self, panels: &[Rendering]) -> Result<Rendering> {
         if let ([only], [Panel { title, .. }]) = (panels, &*self.panels)
             && title.is_empty()
         {
             return Ok(only.clone());
         }
         let Some(first) = panels.first() else {
-            return Err(SceneError::Sheet { panel: 0 });
+            return Err(Error::Sheet { panel: 0 });
         };
         let (width, height) = (first.width as usize, first.height as usize);
         let columns = self.columns.clamp(1, panels.len());
@@ -181,7 +184,7 @@ impl Sheet {
         let mut origins: Vec<String> = Vec::new();
         for (index, (panel, rendering)) in self.panels.iter().zip(panels).enumerate() {
             if (rendering.width, rendering.height) != (first.width, first.height) {
-                return Err(SceneError::Sheet { panel: index });
+                return Err(Error::Sheet { panel: index });
             }
             let (left, top) = (index % columns * width, index / columns * height);
             for (row, line) in rendering.pixels.chunks_exact(width).enumerate() {
@@ -224,12 +227,12 @@ impl Sheet {
 }
 
 /// Scenes that are rendered together, with the panels that they fill.
-struct Group<'a> {
-    scenes: Vec<(usize, &'a Scene)>,
+struct Group<'a, M> {
+    scenes: Vec<(usize, &'a Scene<M>)>,
     differences: Vec<Difference>,
 }
 
-impl Group<'_> {
+impl<M> Group<'_, M> {
     fn append(&mut self, other: Self) {
         let first = self.scenes.len();
         self.scenes.extend(other.scenes);

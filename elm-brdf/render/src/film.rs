@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::tracer::Sample;
-use super::vector::{Rgb, add};
+use crate::tracer::Sample;
+use crate::vector::{Rgb, add};
 
 /// Sums of the samples of every pixel.
 pub(crate) struct Film {

@@ -2,10 +2,10 @@
 
 use std::time::Instant;
 
-use super::account::{Reason, Savings, Tally};
-use super::shelf::Shelf;
-use super::vector::{BLACK, Rgb};
+use crate::account::{Reason, Savings, Tally};
 use crate::error::Result;
+use crate::shelf::Shelf;
+use crate::vector::{BLACK, Rgb};
 use elm_datasets::geometry::Pair;
 
 /// One evaluation that a path waits for.

@@ -1,16 +1,16 @@
 //! Paths from the camera through the scene, many at a time: every path waits at its surface until
 //! all evaluations there are done together.
 
-use super::account::{Reason, Savings, Tally};
-use super::batch::{Batch, CAPACITY, Request, SCATTERED};
-use super::environment::LightSample;
-use super::light::{Light, power_heuristic};
-use super::random::{Purpose, numbers, pixel_seed};
-use super::shape::{Ray, SurfacePoint};
-use super::shelf::Shelf;
-use super::vector::{BLACK, Frame, Rgb, Vec3, add, largest, scaled, times};
-use super::world::{Hit, World};
+use crate::account::{Reason, Savings, Tally};
+use crate::batch::{Batch, CAPACITY, Request, SCATTERED};
+use crate::environment::LightSample;
 use crate::error::Result;
+use crate::light::{Light, power_heuristic};
+use crate::random::{Purpose, numbers, pixel_seed};
+use crate::shape::{Ray, SurfacePoint};
+use crate::shelf::Shelf;
+use crate::vector::{BLACK, Frame, Rgb, Vec3, add, largest, scaled, times};
+use crate::world::{Hit, World};
 use elm_datasets::geometry::{Pair, Vector};
 
 /// Surfaces after which dim paths may end by chance.

@@ -1,14 +1,14 @@
 //! A scene made ready: checked, with its forms in a hierarchy and its files read.
 
-use super::bvh::Hierarchy;
-use super::camera::Camera;
-use super::environment::{Environment, Panorama};
-use super::error::{Place, SceneError};
-use super::light::{Area, Light};
-use super::mesh;
-use super::scene::{Scene, Triple};
-use super::shape::{Form, Ray, SurfacePoint};
-use super::vector::{BLACK, Rgb, Vec3};
+use crate::bvh::Hierarchy;
+use crate::camera::Camera;
+use crate::environment::{Environment, Panorama};
+use crate::error::{Error, Place, Result};
+use crate::light::{Area, Light};
+use crate::mesh;
+use crate::scene::{Scene, Triple};
+use crate::shape::{Form, Ray, SurfacePoint};
+use crate::vector::{BLACK, Rgb, Vec3};
 
 /// Largest picture, in pixels: 8K fits, and takes some three gigabytes while it is made.
 const MAX_PIXELS: u64 = 1 << 25;
@@ -67,7 +67,7 @@ pub(crate) enum Hit {
 }
 
 impl World {
-    pub(crate) fn new(scene: &Scene) -> Result<Self, SceneError> {
+    pub(crate) fn new<M>(scene: &Scene<M>) -> Result<Self> {
         check_image(scene)?;
         let mut builder = Builder {
             scene,
@@ -143,11 +143,11 @@ impl World {
     }
 }
 
-fn check_image(scene: &Scene) -> Result<(), SceneError> {
+fn check_image<M>(scene: &Scene<M>) -> Result<()> {
     let image = &scene.image;
     let place = scene.whole();
     if image.width == 0 || image.height == 0 {
-        return Err(SceneError::Value {
+        return Err(Error::Value {
             place,
             what: "the image size",
             found: format!("{} x {}", image.width, image.height),
@@ -157,7 +157,7 @@ fn check_image(scene: &Scene) -> Result<(), SceneError> {
     let too_many = |what, found: u64, limit: u64| {
         if found > limit {
             let place = scene.whole();
-            return Err(SceneError::TooMany {
+            return Err(Error::TooMany {
                 place,
                 what,
                 found,
@@ -174,7 +174,7 @@ fn check_image(scene: &Scene) -> Result<(), SceneError> {
     too_many(
         "samples per pixel",
         image.samples.into(),
-        Scene::MAX_SAMPLES.into(),
+        Scene::<M>::MAX_SAMPLES.into(),
     )?;
     too_many("surfaces on a path (depth)", image.depth.into(), MAX_DEPTH)?;
     let lights = scene.directional.len() + scene.point.len() + scene.area.len();
@@ -198,7 +198,7 @@ fn check_image(scene: &Scene) -> Result<(), SceneError> {
             } else {
                 "at least 1"
             };
-            return Err(SceneError::Value {
+            return Err(Error::Value {
                 place,
                 what,
                 found,
@@ -210,8 +210,8 @@ fn check_image(scene: &Scene) -> Result<(), SceneError> {
 }
 
 /// A scene on its way to a [`World`].
-struct Builder<'a> {
-    scene: &'a Scene,
+struct Builder<'a, M> {
+    scene: &'a Scene<M>,
     materials: Vec<String>,
     forms: Vec<Form>,
     surfaces: Vec<Surface>,
@@ -219,8 +219,8 @@ struct Builder<'a> {
     objects: u32,
 }
 
-impl Builder<'_> {
-    fn lights(&mut self) -> Result<(), SceneError> {
+impl<M> Builder<'_, M> {
+    fn lights(&mut self) -> Result<()> {
         let scene = self.scene;
         for entry in &scene.directional {
             let place = scene.place(entry);
@@ -253,7 +253,7 @@ impl Builder<'_> {
         if let Some(entry) = &scene.environment {
             let place = scene.place(entry);
             let light = entry.get_ref();
-            let wrong = |found: String, expected| SceneError::Value {
+            let wrong = |found: String, expected| Error::Value {
                 place: place.clone(),
                 what: "environment",
                 found,
@@ -281,7 +281,7 @@ impl Builder<'_> {
         Ok(())
     }
 
-    fn shapes(&mut self) -> Result<(), SceneError> {
+    fn shapes(&mut self) -> Result<()> {
         let scene = self.scene;
         for entry in &scene.sphere {
             let place = scene.place(entry);
@@ -311,7 +311,7 @@ impl Builder<'_> {
             let place = scene.place(entry);
             let shape = entry.get_ref();
             let role = self.reflector(&shape.material)?;
-            let wrong = |found: String, expected| SceneError::Value {
+            let wrong = |found: String, expected| Error::Value {
                 place: place.clone(),
                 what: "mesh",
                 found,
@@ -339,10 +339,10 @@ impl Builder<'_> {
     }
 
     /// The role of a shape with this material.
-    fn reflector(&self, name: &toml::Spanned<String>) -> Result<Role, SceneError> {
+    fn reflector(&self, name: &toml::Spanned<String>) -> Result<Role> {
         match self.materials.binary_search(name.get_ref()) {
             Ok(index) => Ok(Role::Reflector(index)),
-            Err(_) => Err(SceneError::UnknownMaterial {
+            Err(_) => Err(Error::UnknownMaterial {
                 place: self.scene.place(name),
                 name: name.get_ref().clone(),
                 known: self.materials.join(", "),
@@ -361,13 +361,8 @@ impl Builder<'_> {
     }
 }
 
-fn wrong(
-    place: &Place,
-    what: &'static str,
-    found: impl ToString,
-    expected: &'static str,
-) -> SceneError {
-    SceneError::Value {
+fn wrong(place: &Place, what: &'static str, found: impl ToString, expected: &'static str) -> Error {
+    Error::Value {
         place: place.clone(),
         what,
         found: found.to_string(),
@@ -378,7 +373,7 @@ fn wrong(
 /// Coordinates beyond this would overflow when squared a few times over.
 const FARTHEST: f64 = 1e30;
 
-fn finite(place: &Place, what: &'static str, value: Triple) -> Result<Vec3, SceneError> {
+fn finite(place: &Place, what: &'static str, value: Triple) -> Result<Vec3> {
     if value.iter().all(|c| c.abs() <= FARTHEST) {
         Ok(value.into())
     } else {
@@ -391,13 +386,13 @@ fn finite(place: &Place, what: &'static str, value: Triple) -> Result<Vec3, Scen
     }
 }
 
-fn direction(place: &Place, what: &'static str, value: Triple) -> Result<Vec3, SceneError> {
+fn direction(place: &Place, what: &'static str, value: Triple) -> Result<Vec3> {
     finite(place, what, value)?
         .try_normalize(1e-30)
         .ok_or_else(|| wrong(place, what, format!("{value:?}"), "a direction"))
 }
 
-fn colour(place: &Place, what: &'static str, value: Triple) -> Result<Rgb, SceneError> {
+fn colour(place: &Place, what: &'static str, value: Triple) -> Result<Rgb> {
     if value.iter().all(|c| (0.0..=FARTHEST).contains(c)) {
         Ok(value)
     } else {
@@ -406,7 +401,7 @@ fn colour(place: &Place, what: &'static str, value: Triple) -> Result<Rgb, Scene
     }
 }
 
-fn positive(place: &Place, what: &'static str, value: f64) -> Result<f64, SceneError> {
+fn positive(place: &Place, what: &'static str, value: f64) -> Result<f64> {
     if value > 0.0 && value <= FARTHEST {
         Ok(value)
     } else {
@@ -414,7 +409,7 @@ fn positive(place: &Place, what: &'static str, value: f64) -> Result<f64, SceneE
     }
 }
 
-fn edges(place: &Place, u: Triple, v: Triple) -> Result<[Vec3; 2], SceneError> {
+fn edges(place: &Place, u: Triple, v: Triple) -> Result<[Vec3; 2]> {
     let edges = [finite(place, "edge_u", u)?, finite(place, "edge_v", v)?];
     if edges[0].cross(&edges[1]).norm() > 1e-30 {
         Ok(edges)

@@ -2,10 +2,9 @@
 
 use std::fmt::Write;
 
-use super::error::SceneError;
-use super::scene::Scene;
-use super::sheet::{Content, Panel, Sheet};
 use crate::published;
+use crate::scene_materials::{MaterialTable, Scene, Sheet};
+use elm_brdf_render::{Content, Error, Panel};
 
 /// Names of the built-in scenes.
 pub const NAMES: [&str; 4] = ["materials", "contact-sheet", "comparison", "mesh"];
@@ -23,8 +22,8 @@ const COMPARED: [usize; 3] = [1, 15, 25];
 /// of `contact-sheet` and `mesh`, and of the three of `comparison`.
 ///
 /// # Errors
-/// [`SceneError::UnknownBuiltin`] for another name.
-pub fn builtin(name: &str, material: Option<&str>) -> Result<Sheet, SceneError> {
+/// [`Error::UnknownBuiltin`] for another name.
+pub fn builtin(name: &str, material: Option<&str>) -> Result<Sheet, Error> {
     let file = format!("builtin:{name}");
     let parse = |text: &str| Scene::parse(text, file.as_ref());
     // As a TOML string.
@@ -35,7 +34,7 @@ pub fn builtin(name: &str, material: Option<&str>) -> Result<Sheet, SceneError> 
         "materials" => Ok(parse(&materials())?.into()),
         "mesh" => Ok(parse(&subject(MESH, "39"))?.into()),
         "contact-sheet" => {
-            let panels = (0..12).map(|index| -> Result<Panel, SceneError> {
+            let panels = (0..12).map(|index| -> Result<Panel<MaterialTable>, Error> {
                 let degrees = f64::from(index) * 15.0 - 82.5;
                 let (sin, cos) = degrees.to_radians().sin_cos();
                 let text =
@@ -89,7 +88,7 @@ pub fn builtin(name: &str, material: Option<&str>) -> Result<Sheet, SceneError> 
                 caption: "Measured: {data}. Differences are of radiance, times 4.".to_owned(),
             })
         }
-        _ => Err(SceneError::UnknownBuiltin {
+        _ => Err(Error::UnknownBuiltin {
             name: name.to_owned(),
             known: NAMES.join(", "),
         }),

@@ -30,19 +30,21 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use toml::Spanned;
 
-use super::error::{Place, SceneError};
+use crate::error::{Error, Place, Result};
 
 /// A point, direction or colour as written in a file.
 pub type Triple = [f64; 3];
 
 const WHITE: Triple = [1.0; 3];
 
-/// A scene: what one TOML file holds.
+/// A scene: what one TOML file holds, with a table `M` for each material, which a
+/// [`MaterialLoader`](crate::MaterialLoader) understands.
 ///
 /// ```
-/// use elm_brdf::render::Scene;
+/// type Scene = elm_brdf_render::Scene<toml::Table>;
 /// let text = "
 ///     [image]
 ///     width = 4
@@ -67,15 +69,15 @@ const WHITE: Triple = [1.0; 3];
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Scene {
+#[serde(deny_unknown_fields, bound(deserialize = "M: Deserialize<'de>"))]
+pub struct Scene<M> {
     /// Size and quality of the picture.
     pub image: Image,
     /// The viewer.
     pub camera: Camera,
     /// Materials by the names that shapes use.
     #[serde(default)]
-    pub material: BTreeMap<String, Spanned<Material>>,
+    pub material: BTreeMap<String, Spanned<M>>,
     /// Light from infinitely far away.
     #[serde(default)]
     pub directional: Vec<Spanned<Directional>>,
@@ -164,49 +166,6 @@ pub struct Camera {
 
 fn default_up() -> Triple {
     [0.0, 1.0, 0.0]
-}
-
-/// A material. Exactly one of `curet`, `csv`, `model` and `analytic` says where it comes from.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Material {
-    /// A material of CUReT, by number or name; of the stand-in if CUReT's files are not at hand.
-    pub curet: Option<String>,
-    /// Measurements in a CSV file, or in another that `fit` reads.
-    pub csv: Option<PathBuf>,
-    /// Whether the angles of a CSV file are in degrees.
-    #[serde(default)]
-    pub degrees: bool,
-    /// Whose cosine the values of a CSV file are BRDF times of: `theta_i` or `theta_o`.
-    pub cosine_weighted: Option<String>,
-    /// Channels to take of a file of measurements, in this order.
-    #[serde(default)]
-    pub channels: Vec<String>,
-    /// Columns to leave out of one.
-    #[serde(default)]
-    pub ignore: Vec<String>,
-    /// What to do with negative values in one: `clamp` (if not given), `keep` or `drop`.
-    pub invalid: Option<String>,
-    /// What is fitted to measurements: `elm` (if not given), `interpolation`, which passes through
-    /// them, or one of the names of [`reference::Analytic`](crate::reference::Analytic).
-    pub fit: Option<String>,
-    /// Neurons of a network that is fitted.
-    pub neurons: Option<usize>,
-    /// A saved model.
-    pub model: Option<PathBuf>,
-    /// A formula: `lambert`, `oren-nayar`, `ward` or `ggx`.
-    pub analytic: Option<String>,
-    /// Reflectance of the formula's diffuse part.
-    pub albedo: Option<f64>,
-    /// Roughness of the formula: sigma of Oren-Nayar in radians, alpha of Ward and GGX.
-    pub roughness: Option<f64>,
-    /// Strength of the formula's highlight: Ward's albedo, reflectance of GGX at normal incidence.
-    pub specular: Option<f64>,
-    /// Colour that the values are multiplied by, for data without colour.
-    pub tint: Option<Triple>,
-    /// Scale the material down where it would reflect more light than it receives.
-    #[serde(default)]
-    pub conserve_energy: bool,
 }
 
 /// Light from infinitely far away.
@@ -339,44 +298,9 @@ fn one() -> f64 {
     1.0
 }
 
-impl Scene {
+impl<M> Scene<M> {
     /// Most samples per pixel.
     pub const MAX_SAMPLES: u32 = 1 << 16;
-
-    /// Reads a scene from a file.
-    ///
-    /// # Errors
-    /// [`SceneError::Read`], and as [`parse`](Self::parse).
-    pub fn read(path: &Path) -> Result<Self, SceneError> {
-        let text = std::fs::read_to_string(path).map_err(|reason| SceneError::Read {
-            path: path.to_owned(),
-            reason,
-        })?;
-        Self::parse(&text, path)
-    }
-
-    /// Reads a scene from a text; `file` is what errors call it, and relative to which other
-    /// files are found.
-    ///
-    /// # Errors
-    /// [`SceneError::Syntax`] with the line, for a text that is no TOML, and for a field that is
-    /// missing, unknown or of another kind.
-    pub fn parse(text: &str, file: &Path) -> Result<Self, SceneError> {
-        let source = Source {
-            file: file.to_owned(),
-            line_ends: text.match_indices('\n').map(|(at, _)| at).collect(),
-        };
-        match toml::from_str::<Self>(text) {
-            Ok(scene) => Ok(Self { source, ..scene }),
-            Err(error) => Err(SceneError::Syntax {
-                place: Place {
-                    line: error.span().map(|span| source.line(span.start)),
-                    file: source.file,
-                },
-                message: error.message().lines().collect::<Vec<_>>().join(" "),
-            }),
-        }
-    }
 
     /// Where the bytes of `entry` stand.
     pub(crate) fn place<T>(&self, entry: &Spanned<T>) -> Place {
@@ -399,6 +323,43 @@ impl Scene {
         match self.source.file.parent() {
             Some(dir) => dir.join(file),
             None => file.to_owned(),
+        }
+    }
+}
+
+impl<M: DeserializeOwned> Scene<M> {
+    /// Reads a scene from a file.
+    ///
+    /// # Errors
+    /// [`Error::Read`], and as [`parse`](Self::parse).
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|reason| Error::Read {
+            path: path.to_owned(),
+            reason,
+        })?;
+        Self::parse(&text, path)
+    }
+
+    /// Reads a scene from a text; `file` is what errors call it, and relative to which other
+    /// files are found.
+    ///
+    /// # Errors
+    /// [`Error::Syntax`] with the line, for a text that is no TOML, and for a field that is
+    /// missing, unknown or of another kind.
+    pub fn parse(text: &str, file: &Path) -> Result<Self> {
+        let source = Source {
+            file: file.to_owned(),
+            line_ends: text.match_indices('\n').map(|(at, _)| at).collect(),
+        };
+        match toml::from_str::<Self>(text) {
+            Ok(scene) => Ok(Self { source, ..scene }),
+            Err(error) => Err(Error::Syntax {
+                place: Place {
+                    line: error.span().map(|span| source.line(span.start)),
+                    file: source.file,
+                },
+                message: error.message().lines().collect::<Vec<_>>().join(" "),
+            }),
         }
     }
 }

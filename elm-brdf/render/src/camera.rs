@@ -1,9 +1,9 @@
 //! From a point of the picture to a ray, and back.
 
-use super::error::SceneError;
-use super::scene::{self, Scene};
-use super::shape::Ray;
-use super::vector::Vec3;
+use crate::error::{Error, Result};
+use crate::scene::{self, Scene};
+use crate::shape::Ray;
+use crate::vector::Vec3;
 
 /// A pinhole or an orthographic camera.
 #[derive(Debug, Clone)]
@@ -25,7 +25,7 @@ enum Projection {
 }
 
 impl Camera {
-    pub(crate) fn new(scene: &Scene) -> Result<Self, SceneError> {
+    pub(crate) fn new<M>(scene: &Scene<M>) -> Result<Self> {
         let scene::Camera {
             position,
             target,
@@ -33,7 +33,7 @@ impl Camera {
             fov,
             height,
         } = &scene.camera;
-        let wrong = |what, found: String, expected| SceneError::Value {
+        let wrong = |what, found: String, expected| Error::Value {
             place: scene.whole(),
             what,
             found,
@@ -127,11 +127,11 @@ impl Camera {
 mod tests {
     use super::*;
 
-    fn camera(lens: &str) -> Result<Camera, SceneError> {
+    fn camera(lens: &str) -> Result<Camera> {
         let text = format!(
             "[image]\nwidth = 40\nheight = 20\n[camera]\nposition = [1, 2, 5]\ntarget = [1, 2, 0]\n{lens}"
         );
-        Camera::new(&Scene::parse(&text, "t".as_ref())?)
+        Camera::new(&Scene::<toml::Table>::parse(&text, "t".as_ref())?)
     }
 
     #[test]

@@ -1,0 +1,37 @@
+//! The only place that chooses a network for a material: what `fit` writes, `render` and `gallery`
+//! show, and `export` exports, `compare` and `pareto` judge.
+
+use ndarray::ArrayView2;
+
+use crate::error::Result;
+use crate::fit::{AnyFit, Fit, boxed};
+use crate::model::{BrdfModel, Tuned};
+use elm_datasets::geometry::Pair;
+
+/// Chooses a network, given how many neurons are asked for, if that is said.
+pub type Recipe = dyn Fn(Option<usize>) -> Box<AnyFit> + Send + Sync;
+
+/// The [`Recipe`] of this project: [`Tuned`], one network for all channels of a material.
+#[must_use]
+pub fn network(neurons: Option<usize>) -> Box<AnyFit> {
+    boxed(Joint(Tuned {
+        neurons,
+        ..Tuned::default()
+    }))
+}
+
+/// One network for all channels, where [`Tuned`] as a [`Fit`], which takes channels for
+/// materials of their own, makes one for each.
+#[derive(Debug, Clone)]
+pub struct Joint(
+    /// What chooses the network.
+    pub Tuned,
+);
+
+impl Fit for Joint {
+    type Model = BrdfModel;
+
+    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<BrdfModel> {
+        self.0.fit_model(pairs, values)
+    }
+}

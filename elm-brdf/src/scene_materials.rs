@@ -1,0 +1,410 @@
+//! The materials of scenes: what their tables in a scene file may say, and what makes models of them.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use elm_brdf_render::{LoadError, LoadedMaterial, MaterialLoader};
+use elm_datasets::Brdf;
+use elm_datasets::geometry::pairs;
+use elm_datasets::lobes::Formula;
+use elm_datasets::merl::Merl;
+use elm_datasets::rgl::Rgl;
+use elm_datasets::scattered::{self, AngleUnit};
+use elm_datasets::{Format, Invalid, Measurements, OpenOptions, Samples, curet, synthetic};
+use serde::Deserialize;
+
+use crate::batch::Packed;
+use crate::error::{Error, Result};
+use crate::features::Features;
+use crate::fit::{Model, boxed};
+use crate::link::Link;
+use crate::model::BrdfModel;
+use crate::recipes::{self, Recipe};
+use crate::reference;
+
+/// A scene whose materials are described by [`MaterialTable`]s.
+pub type Scene = elm_brdf_render::Scene<MaterialTable>;
+/// A sheet of such scenes.
+pub type Sheet = elm_brdf_render::Sheet<MaterialTable>;
+
+/// A material as a scene file describes it. Exactly one of `curet`, `csv`, `model`, `table` and `analytic`
+/// says where it comes from.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MaterialTable {
+    /// A material of CUReT, by number or name; of the stand-in if CUReT's files are not at hand.
+    pub curet: Option<String>,
+    /// Measurements in a CSV file, or in another that `fit` reads.
+    pub csv: Option<PathBuf>,
+    /// Whether the angles of a CSV file are in degrees.
+    #[serde(default)]
+    pub degrees: bool,
+    /// Whose cosine the values of a CSV file are BRDF times of: `theta_i` or `theta_o`.
+    pub cosine_weighted: Option<String>,
+    /// Channels to take of a file of measurements, in this order.
+    #[serde(default)]
+    pub channels: Vec<String>,
+    /// Columns to leave out of one.
+    #[serde(default)]
+    pub ignore: Vec<String>,
+    /// What to do with negative values in one: `clamp` (if not given), `keep` or `drop`.
+    pub invalid: Option<String>,
+    /// What is fitted to measurements: `elm` (if not given), `interpolation`, which passes through
+    /// them, or one of the names of [`reference::Analytic`].
+    pub fit: Option<String>,
+    /// Neurons of a network that is fitted.
+    pub neurons: Option<usize>,
+    /// A saved model.
+    pub model: Option<PathBuf>,
+    /// A measured table, shown as it is: MERL `.binary`, or RGL `.bsdf` in red, green and blue.
+    pub table: Option<PathBuf>,
+    /// A formula: `lambert`, `oren-nayar`, `ward` or `ggx`.
+    pub analytic: Option<String>,
+    /// Reflectance of the formula's diffuse part.
+    pub albedo: Option<f64>,
+    /// Roughness of the formula: sigma of Oren-Nayar in radians, alpha of Ward and GGX.
+    pub roughness: Option<f64>,
+    /// Strength of the formula's highlight: Ward's albedo, reflectance of GGX at normal incidence.
+    pub specular: Option<f64>,
+    /// Colour that the values are multiplied by, for data without colour.
+    pub tint: Option<[f64; 3]>,
+    /// Scale the material down where it would reflect more light than it receives.
+    #[serde(default)]
+    pub conserve_energy: bool,
+}
+
+/// A model and where it comes from, in a word: "CUReT", "stand-in", a file's name, "analytic".
+pub struct Fitted {
+    /// The model.
+    pub model: Box<dyn Model>,
+    /// The data.
+    pub origin: String,
+    /// What the data call the material, if they do.
+    pub name: Option<String>,
+    /// What was assumed of the data.
+    pub notes: Vec<String>,
+}
+
+/// Models fitted to CUReT's files, to the stand-in or to files of one's own, saved models, measured
+/// tables, and formulas. What was made once is used again for the same table.
+pub struct Library {
+    /// Folder of CUReT's files; `None` for the stand-in.
+    curet: Option<PathBuf>,
+    /// What fits a network, `fit = "elm"`.
+    network: Box<Recipe>,
+    made: Mutex<Vec<(MaterialTable, PathBuf, Slot)>>,
+}
+
+/// Held while a material is made, so that it is made once.
+type Slot = Arc<Mutex<Option<Made>>>;
+
+/// What a table came to.
+#[derive(Clone)]
+struct Made {
+    brdf: Arc<dyn Brdf>,
+    multiply_adds: usize,
+    origin: String,
+    name: Option<String>,
+    notes: Vec<String>,
+}
+
+/// The stand-in's seed.
+const STAND_IN_SEED: u64 = 1;
+
+impl Library {
+    /// With CUReT's files in a folder, or with the stand-in, and the networks of
+    /// [`recipes::network`].
+    #[must_use]
+    pub fn new(curet: Option<PathBuf>) -> Self {
+        Self::with_network(curet, Box::new(recipes::network))
+    }
+
+    /// The same with other networks.
+    #[must_use]
+    pub fn with_network(curet: Option<PathBuf>, network: Box<Recipe>) -> Self {
+        Self {
+            curet,
+            network,
+            made: Mutex::default(),
+        }
+    }
+
+    /// The model that a table asks for; its files are relative to `dir`.
+    ///
+    /// # Errors
+    /// [`Error::MaterialSource`] for a table or a formula, which are no models, and unless exactly one
+    /// source is named; whatever reading and fitting report.
+    pub fn model(&self, table: &MaterialTable, dir: &Path) -> Result<Fitted> {
+        match table.source()? {
+            Source::Curet(name) => {
+                let (measurements, data) = self.measurements(name)?;
+                let material = measurements.materials.first();
+                let (Some(samples), Some(material)) = (measurements.samples(0), material) else {
+                    return Err(no_measurements(data));
+                };
+                Ok(Fitted {
+                    name: Some(format!("{} {}", material.id, material.name)),
+                    ..self.fitted(table, &samples, data)?
+                })
+            }
+            Source::Samples(file) => {
+                let (samples, notes) = read(&dir.join(file), table)?;
+                Ok(Fitted {
+                    notes,
+                    ..self.fitted(table, &samples, &file.display().to_string())?
+                })
+            }
+            Source::Model(file) => {
+                let model: BrdfModel = crate::file::load(&dir.join(file))?;
+                Ok(Fitted {
+                    origin: format!("{} ({})", file.display(), model.provenance().data),
+                    name: None,
+                    model: Box::new(model.in_rgb_order()?),
+                    notes: Vec::new(),
+                })
+            }
+            Source::Table(_) | Source::Formula(_) => Err(Error::MaterialSource),
+        }
+    }
+
+    fn fitted(&self, table: &MaterialTable, samples: &Samples, data: &str) -> Result<Fitted> {
+        let (method, how) = match table.fit.as_deref() {
+            None | Some("elm") => ((self.network)(table.neurons), "ELM fitted to".to_owned()),
+            Some("interpolation") => {
+                let interpolation = reference::RadialBasis {
+                    features: Features::ReciprocalCosines,
+                    link: Link::default_log(),
+                    radial: reference::Radial::ThinPlate,
+                    smoothing: reference::Smoothing::Exact,
+                };
+                (boxed(interpolation), "interpolated".to_owned())
+            }
+            Some(name) => {
+                let all = reference::Analytic::ALL;
+                let family = all.into_iter().find(|family| family.name() == name);
+                let family = family.ok_or_else(|| Error::UnknownName {
+                    what: "fit",
+                    name: name.to_owned(),
+                    expected: format!(
+                        "elm, interpolation, {}",
+                        all.map(reference::Analytic::name).join(", ")
+                    ),
+                })?;
+                (boxed(family), format!("{name} fitted to"))
+            }
+        };
+        let model = method.fit(&pairs(&samples.directions), samples.values.view())?;
+        Ok(Fitted {
+            model,
+            origin: format!("{how} {data}"),
+            name: None,
+            notes: Vec::new(),
+        })
+    }
+
+    /// The measurements of a material of CUReT or of the stand-in, and what a caption calls them.
+    fn measurements(&self, name: &str) -> Result<(Measurements, &'static str)> {
+        let id = match (&self.curet, name.parse()) {
+            // A scene made for CUReT renders with the stand-in too, which has names of its own.
+            (None, Err(_)) => synthetic::find(name)?,
+            (_, found) => found?,
+        };
+        Ok(match &self.curet {
+            Some(dir) => (curet::read(dir, &[id], Invalid::Clamp)?, "CUReT"),
+            None => (
+                synthetic::measurements(STAND_IN_SEED, &[id], Invalid::Clamp),
+                "the synthetic stand-in",
+            ),
+        })
+    }
+
+    /// Room for what a table comes to, the same for the same table.
+    fn slot(&self, table: MaterialTable, dir: &Path) -> Slot {
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        let same = |known: &&(MaterialTable, PathBuf, Slot)| known.0 == table && known.1 == dir;
+        if let Some((_, _, slot)) = made.iter().find(same) {
+            return slot.clone();
+        }
+        let slot = Slot::default();
+        made.push((table, dir.to_owned(), slot.clone()));
+        slot
+    }
+
+    fn make(&self, table: &MaterialTable, dir: &Path) -> Result<Made> {
+        let plain = |brdf: Arc<dyn Brdf>, origin: String| Made {
+            brdf,
+            multiply_adds: 0,
+            origin,
+            name: None,
+            notes: Vec::new(),
+        };
+        match table.source()? {
+            Source::Table(file) => {
+                let path = dir.join(file);
+                let brdf: Arc<dyn Brdf> = match Format::of(&path)? {
+                    Format::Merl => Arc::new(Merl::read(&path)?),
+                    Format::Rgl => Arc::new(Rgl::read(&path)?),
+                    other => {
+                        return Err(Error::UnknownName {
+                            what: "table",
+                            name: other.name().to_owned(),
+                            expected: "merl, rgl".to_owned(),
+                        });
+                    }
+                };
+                Ok(plain(brdf, format!("measured, {}", file.display())))
+            }
+            Source::Formula(name) => Ok(plain(
+                Arc::new(table.formula(name)?),
+                "a formula".to_owned(),
+            )),
+            _ => {
+                let fitted = self.model(table, dir)?;
+                Ok(Made {
+                    multiply_adds: fitted.model.multiply_adds(),
+                    brdf: packed(fitted.model),
+                    origin: fitted.origin,
+                    name: fitted.name,
+                    notes: fitted.notes,
+                })
+            }
+        }
+    }
+}
+
+/// A network ready for long batches, any other model as it is.
+fn packed(model: Box<dyn Model>) -> Arc<dyn Brdf> {
+    match BrdfModel::of(&*model).map(Packed::<f64>::new) {
+        Some(Ok(packed)) => Arc::new(packed),
+        _ => Arc::new(model),
+    }
+}
+
+impl MaterialLoader<MaterialTable> for Library {
+    fn load(&self, table: &MaterialTable, dir: &Path) -> Result<LoadedMaterial, LoadError> {
+        let untinted = MaterialTable {
+            tint: None,
+            conserve_energy: false,
+            ..table.clone()
+        };
+        let slot = self.slot(untinted, dir);
+        let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
+        let made = match &*slot {
+            Some(made) => made.clone(),
+            None => slot.insert(self.make(table, dir)?).clone(),
+        };
+        Ok(LoadedMaterial {
+            brdf: Box::new(made.brdf),
+            multiply_adds: made.multiply_adds,
+            tint: table.tint.unwrap_or([1.0; 3]),
+            conserve_energy: table.conserve_energy,
+            origin: made.origin,
+            name: made.name,
+            notes: made.notes,
+        })
+    }
+}
+
+/// Where a material comes from.
+enum Source<'a> {
+    Curet(&'a str),
+    Samples(&'a Path),
+    Model(&'a Path),
+    Table(&'a Path),
+    Formula(&'a str),
+}
+
+impl MaterialTable {
+    fn source(&self) -> Result<Source<'_>> {
+        let sources = [
+            self.curet.as_deref().map(Source::Curet),
+            self.csv.as_deref().map(Source::Samples),
+            self.model.as_deref().map(Source::Model),
+            self.table.as_deref().map(Source::Table),
+            self.analytic.as_deref().map(Source::Formula),
+        ];
+        let mut named = sources.into_iter().flatten();
+        match (named.next(), named.next()) {
+            (Some(source), None) => Ok(source),
+            _ => Err(Error::MaterialSource),
+        }
+    }
+
+    /// The files that it names, relative to the scene's folder.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let files = [&self.csv, &self.model, &self.table];
+        files.into_iter().filter_map(|file| file.as_deref())
+    }
+
+    fn formula(&self, name: &str) -> Result<Formula> {
+        let albedo = self.albedo.unwrap_or(0.5);
+        let roughness = self.roughness.unwrap_or(0.3);
+        let specular = self.specular.unwrap_or(0.04);
+        Ok(match name {
+            "lambert" => Formula::lambert(albedo)?,
+            "oren-nayar" => Formula::oren_nayar(albedo, roughness)?,
+            "ward" => Formula::lambert(albedo)?.with_ward(specular, roughness)?,
+            "ggx" => Formula::lambert(albedo)?.with_ggx(specular, roughness)?,
+            _ => {
+                return Err(Error::UnknownName {
+                    what: "formula",
+                    name: name.to_owned(),
+                    expected: "lambert, oren-nayar, ward, ggx".to_owned(),
+                });
+            }
+        })
+    }
+}
+
+fn no_measurements(data: &str) -> Error {
+    Error::UnknownName {
+        what: "measurements",
+        name: data.to_owned(),
+        expected: "205 of them".to_owned(),
+    }
+}
+
+/// Samples from a file, read as every command reads it, with red before green before blue; and
+/// what was assumed of them.
+fn read(path: &Path, material: &MaterialTable) -> Result<(Samples, Vec<String>)> {
+    let weighted = material.cosine_weighted.as_deref();
+    if let Some(other) = weighted.filter(|angle| !["theta_i", "theta_o"].contains(angle)) {
+        return Err(Error::UnknownName {
+            what: "cosine",
+            name: other.to_owned(),
+            expected: "theta_i, theta_o".to_owned(),
+        });
+    }
+    let invalid: Invalid = match &material.invalid {
+        Some(way) => way.parse()?,
+        None => Invalid::default(),
+    };
+    let options = OpenOptions {
+        scattered: scattered::Options {
+            unit: if material.degrees {
+                AngleUnit::Degrees
+            } else {
+                AngleUnit::Radians
+            },
+            cosine_weighted: weighted == Some("theta_i"),
+        },
+        columns: scattered::Columns {
+            channels: material.channels.clone(),
+            ignore: material.ignore.clone(),
+            scatter_cosine: weighted == Some("theta_o"),
+        },
+        invalid,
+        ..OpenOptions::default()
+    };
+    let opened = elm_datasets::open(path, &options)?;
+    let mut notes: Vec<String> = opened.notes.iter().map(ToString::to_string).collect();
+    if opened.missing > 0 {
+        notes.push(format!(
+            "{} values are missing, {} measurements were left out",
+            opened.missing, opened.left_out
+        ));
+    }
+    let noted = |note| format!("{}: {note}", path.display());
+    let notes = notes.into_iter().map(noted).collect();
+    Ok((opened.samples.in_rgb_order(), notes))
+}
