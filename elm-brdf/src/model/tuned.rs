@@ -320,14 +320,11 @@ impl Drawn {
 const NOISY: f64 = 5.0;
 /// How much worse a reciprocal network may be and still be taken.
 const TIE: f64 = 1.03;
-/// How much worse one of sums and differences may be than another that tells light from viewer: its inputs
-/// leave a network free to heed that little, which serves most measurements best, and held-out errors of
-/// a few hundred rows are not sure to a tenth.
-const USUAL: f64 = 1.1;
 
-/// The better of two networks: one whose albedo is physical, then the reciprocal one where they tie, the one
-/// of sums and differences where that comes near, then the one with the smaller error.
-fn better(one: Finished, other: Finished) -> Finished {
+/// The better of two networks: one whose albedo is physical, then the one with the smaller error, where
+/// that of others than sums and differences counts `others` times and of what is not reciprocal [`TIE`]
+/// times.
+fn better(one: Finished, other: Finished, others: f64) -> Finished {
     let physical = |finished: &Finished| finished.excess <= 0.0;
     match (physical(&one), physical(&other)) {
         (true, false) => return one,
@@ -341,10 +338,15 @@ fn better(one: Finished, other: Finished) -> Finished {
         }
         (true, true) => {}
     }
-    let handicap = |finished: &Finished| match finished.features {
-        set if set.is_reciprocal() => finished.score,
-        Features::SumDifference => TIE * finished.score,
-        _ => USUAL * TIE * finished.score,
+    let handicap = |finished: &Finished| {
+        let set = finished.features;
+        let unusual = if set == Features::SumDifference {
+            1.0
+        } else {
+            others
+        };
+        let tie = if set.is_reciprocal() { 1.0 } else { TIE };
+        unusual * tie * finished.score
     };
     if handicap(&other) < handicap(&one) {
         other

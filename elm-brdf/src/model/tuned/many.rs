@@ -72,7 +72,7 @@ pub(super) fn fit(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) ->
         let finished = finished(&problem, setting, &rows)?;
         found = Some(match found {
             None => finished,
-            Some(known) => better(known, finished),
+            Some(known) => better(known, finished, 1.0),
         });
     }
     let Some(found) = found else {
