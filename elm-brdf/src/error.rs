@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use elm_datasets::brdf::EvalError;
+use elm_datasets::brdf::{ArgumentError, EvalError};
 use thiserror::Error;
 
 /// Result of everything in this crate that can fail.
@@ -72,9 +72,6 @@ pub enum Error {
         /// Which.
         what: &'static str,
     },
-    /// A reflectance could not be evaluated.
-    #[error(transparent)]
-    Arguments(#[from] elm_datasets::brdf::ArgumentError),
     /// A reflectance of another crate could not be evaluated.
     #[error(transparent)]
     Evaluation(EvalError),
@@ -165,9 +162,26 @@ pub enum Error {
 
 impl From<EvalError> for Error {
     fn from(error: EvalError) -> Self {
-        match error.downcast() {
-            Ok(own) => own,
+        let other = match error.downcast() {
+            Ok(own) => return own,
+            Err(other) => other,
+        };
+        match other.downcast::<ArgumentError>() {
+            Ok(argument) => argument.into(),
             Err(other) => Self::Evaluation(other),
+        }
+    }
+}
+
+impl From<ArgumentError> for Error {
+    fn from(error: ArgumentError) -> Self {
+        match error {
+            ArgumentError::NotFinite { row, column } => Self::NotFinite {
+                what: "directions",
+                row,
+                column,
+            },
+            other => Self::Evaluation(other.into()),
         }
     }
 }

@@ -15,7 +15,7 @@ const COMPARED: [usize; 3] = [1, 15, 25];
 /// A built-in scene:
 /// - `materials`: a sphere of each of the paper's 15 materials;
 /// - `contact-sheet`: one material under a moving light;
-/// - `comparison`: measured, fitted and analytic side by side, with the differences;
+/// - `comparison`: interpolated, fitted and analytic side by side, with the differences;
 /// - `mesh`: a torus knot in a studio.
 ///
 /// `material`, a number or name of CUReT or of the stand-in, takes the place of the one material
@@ -59,7 +59,7 @@ pub fn builtin(name: &str, material: Option<&str>) -> Result<Sheet, Error> {
             for name in materials {
                 let first = panels.len();
                 for (title, fit) in [
-                    ("{name}: measured", "interpolation"),
+                    ("{name}: interpolated", "interpolation"),
                     ("ELM", "elm"),
                     ("GGX + Oren-Nayar", "ggx+oren-nayar"),
                 ] {
@@ -71,7 +71,10 @@ pub fn builtin(name: &str, material: Option<&str>) -> Result<Sheet, Error> {
                         content: Content::Scene(Box::new(parse(&text)?)),
                     });
                 }
-                for (title, of) in [("4 |ELM - measured|", 1), ("4 |GGX+ON - measured|", 2)] {
+                for (title, of) in [
+                    ("4 |ELM - interpolated|", 1),
+                    ("4 |GGX+ON - interpolated|", 2),
+                ] {
                     panels.push(Panel {
                         title: title.to_owned(),
                         content: Content::Difference {
@@ -85,7 +88,7 @@ pub fn builtin(name: &str, material: Option<&str>) -> Result<Sheet, Error> {
             Ok(Sheet {
                 columns: 5,
                 panels,
-                caption: "Measured: {data}. Differences are of radiance, times 4.".to_owned(),
+                caption: "{data}. Differences are of radiance, times 4.".to_owned(),
             })
         }
         _ => Err(Error::UnknownBuiltin {

@@ -100,7 +100,7 @@ fn models() -> Vec<(String, Box<dyn Brdf>)> {
     let usual = recipes::network(None);
     models.push((
         "usual".to_owned(),
-        Box::new(usual.fit(&pairs, samples.values.view()).unwrap()),
+        usual.fit(&pairs, samples.values.view()).unwrap(),
     ));
     models
 }

@@ -154,13 +154,43 @@ fn circle<'a>(
 #[test]
 fn no_import_leads_back_to_where_it_came_from() {
     let root: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    for package in ["elm", "elm-datasets", "elm-brdf", "benches"] {
+    for package in [
+        "elm",
+        "elm-datasets",
+        "elm-brdf/render",
+        "elm-brdf",
+        "benches",
+    ] {
         let modules = modules(&root.join(package).join("src"));
         assert!(modules.len() > 5, "{package}: {} files", modules.len());
         if let Some(way) = circle(&arrows(&modules)) {
             let way: Vec<String> = way.iter().map(|module| module.join("::")).collect();
             panic!("{package}: a circle of imports: {}", way.join(" -> "));
         }
+    }
+}
+
+#[test]
+fn packages_depend_on_none_above_them() {
+    let root: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let own = ["elm-learn", "elm-datasets", "elm-brdf-render", "elm-brdf"];
+    for (package, expected) in [
+        ("elm", &[][..]),
+        ("elm-datasets", &[]),
+        ("elm-brdf/render", &["elm-datasets"]),
+        (
+            "elm-brdf",
+            &["elm-brdf-render", "elm-datasets", "elm-learn"],
+        ),
+    ] {
+        let manifest = std::fs::read_to_string(root.join(package).join("Cargo.toml")).unwrap();
+        let (_, rest) = manifest.split_once("\n[dependencies]\n").unwrap();
+        let table = rest.split("\n[").next().unwrap();
+        let names = table
+            .lines()
+            .filter_map(|line| line.split(['.', ' ']).next());
+        let found: Vec<&str> = names.filter(|name| own.contains(name)).collect();
+        assert_eq!(found, expected, "{package}");
     }
 }
 
