@@ -40,6 +40,9 @@ pub(crate) struct Batch {
     pairs: Vec<Pair>,
     /// For each request in order, the pair that stands for it.
     pair_of: Vec<usize>,
+    /// For the evaluation of a material.
+    room: Vec<f64>,
+    found: Vec<Rgb>,
 }
 
 impl Batch {
@@ -61,6 +64,8 @@ impl Batch {
             order,
             pairs,
             pair_of,
+            room,
+            found,
         } = self;
         values.clear();
         values.resize(requests.len(), BLACK);
@@ -82,7 +87,7 @@ impl Batch {
                 }
                 pair_of.push(pairs.len() - 1);
             }
-            let found = material.eval(pairs)?;
+            material.eval_into(pairs, room, found)?;
             // Without colour each channel is the same network again.
             let times = if material.channels() == 1 { 3 } else { 1 };
             let done = pairs.len() as u64;
@@ -93,7 +98,7 @@ impl Batch {
             } else {
                 for _ in 1..times {
                     // Brute force, and the same again.
-                    std::hint::black_box(material.eval(pairs)?);
+                    material.eval_into(pairs, room, std::hint::black_box(found))?;
                     tally.evaluations[index] += done;
                 }
             }

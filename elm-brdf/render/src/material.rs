@@ -1,6 +1,6 @@
 //! A material as the renderer uses it: any [`Brdf`] made safe, with a way to sample it.
 
-use ndarray::Array2;
+use ndarray::ArrayViewMut2;
 
 use crate::error::{Error, Result};
 use crate::proxy::{Proxy, Survey};
@@ -57,8 +57,13 @@ impl Material {
             return Err(Error::Tint { found: tint });
         }
         let survey = Survey::new();
-        let raw =
-            |pairs: &[Pair]| -> Result<Vec<Rgb>> { Ok(rows(&brdf.eval(pairs)?, f64::INFINITY)) };
+        let raw = |pairs: &[Pair]| -> Result<Vec<Rgb>> {
+            let values = brdf.eval(pairs)?;
+            let rows = values.rows().into_iter();
+            Ok(rows
+                .map(|row| colour(&row.to_vec(), f64::INFINITY))
+                .collect())
+        };
         let cells = raw(&survey.cells)?;
         let highest = cells
             .iter()
@@ -100,11 +105,30 @@ impl Material {
     /// # Errors
     /// Whatever the model's own evaluation reports.
     pub fn eval(&self, pairs: &[Pair]) -> Result<Vec<Rgb>> {
-        let mut values = rows(&self.brdf.eval(pairs)?, self.ceiling);
-        for value in &mut values {
-            *value = times(*value, self.factor);
-        }
+        let mut values = Vec::new();
+        self.eval_into(pairs, &mut Vec::new(), &mut values)?;
         Ok(values)
+    }
+
+    /// As [`eval`](Self::eval), in place of what is in `values`. What is in `room` does not matter; kept from
+    /// one call to the next, both save allocations.
+    pub(crate) fn eval_into(
+        &self,
+        pairs: &[Pair],
+        room: &mut Vec<f64>,
+        values: &mut Vec<Rgb>,
+    ) -> Result<()> {
+        let channels = self.channels();
+        room.clear();
+        room.resize(pairs.len() * channels, 0.0);
+        let shape = (pairs.len(), channels);
+        if let Ok(view) = ArrayViewMut2::from_shape(shape, &mut room[..]) {
+            self.brdf.eval_into(pairs, view)?;
+        }
+        values.clear();
+        let rows = room.chunks_exact(channels);
+        values.extend(rows.map(|row| times(colour(row, self.ceiling), self.factor)));
+        Ok(())
     }
 
     /// Draws an incident direction for a viewer at `outgoing`, from two numbers in \[0, 1), with
@@ -165,17 +189,13 @@ impl std::fmt::Debug for Material {
     }
 }
 
-/// Rows of one or three values as colours between 0 and `ceiling`.
-fn rows(values: &Array2<f64>, ceiling: f64) -> Vec<Rgb> {
+/// One or three values as a colour between 0 and `ceiling`.
+fn colour(values: &[f64], ceiling: f64) -> Rgb {
     // In this order also no number becomes 0, and infinity the ceiling.
     let safe = |value: f64| value.max(0.0).min(ceiling);
     let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
-    values
-        .rows()
-        .into_iter()
-        .map(|row| match row.len() {
-            1 => [finite(safe(row[0])); 3],
-            _ => [0, 1, 2].map(|channel| finite(safe(row[channel]))),
-        })
-        .collect()
+    match *values {
+        [r, g, b] => [r, g, b].map(|value| finite(safe(value))),
+        _ => [finite(safe(values[0])); 3],
+    }
 }

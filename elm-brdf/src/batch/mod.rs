@@ -38,7 +38,7 @@ mod packed;
 mod real;
 
 use elm_datasets::brdf::{EvalError, check_arguments};
-use ndarray::ArrayViewMut2;
+use ndarray::{ArrayViewMut2, Axis};
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::error::{Error, Result};
@@ -50,6 +50,9 @@ pub use real::Real;
 
 /// Rows in a block.
 pub(crate) const ROWS: usize = 64;
+
+/// Pairs whose directions are turned into columns at a time: they stay in the second-level cache.
+const CHUNK: usize = 1024;
 
 /// One number of each row of a block, on a cache line of its own.
 #[derive(Debug, Clone, Copy)]
@@ -73,15 +76,22 @@ impl<A: Real> Columns<A> {
     /// The components of these pairs.
     #[must_use]
     pub fn new(pairs: &[Pair]) -> Self {
-        let component = |number: usize| {
+        let mut columns = Self {
+            components: std::array::from_fn(|_| Vec::new()),
+        };
+        columns.replace(pairs);
+        columns
+    }
+
+    /// The components of these pairs in place of what was there, whose room is used again.
+    fn replace(&mut self, pairs: &[Pair]) {
+        for (number, component) in self.components.iter_mut().enumerate() {
             let of = |pair: &Pair| match number {
                 0..3 => pair.incident[number],
                 _ => pair.outgoing[number - 3],
             };
-            pairs.iter().map(|pair| A::from_f64(of(pair))).collect()
-        };
-        Self {
-            components: std::array::from_fn(component),
+            component.clear();
+            component.extend(pairs.iter().map(|pair| A::from_f64(of(pair))));
         }
     }
 
@@ -146,13 +156,23 @@ pub(crate) fn eval_pairs<A: Real>(
     pairs: &[Pair],
     mut values: ArrayViewMut2<'_, f64>,
 ) -> Result<(), EvalError> {
-    check_arguments(pairs, &values, model.channels())?;
-    let mut columns = vec![A::zero(); pairs.len() * model.channels()];
-    model.eval_into(&Columns::new(pairs), &mut columns)?;
-    let columns = columns.chunks_exact(pairs.len().max(1));
-    for (mut to, from) in values.columns_mut().into_iter().zip(columns) {
-        for (to, from) in to.iter_mut().zip(from) {
-            *to = from.as_f64();
+    let channels = model.channels();
+    check_arguments(pairs, &values, channels)?;
+    let mut directions = Columns::new(&[]);
+    let mut found = vec![A::zero(); channels * pairs.len().min(CHUNK)];
+    let rows = values.axis_chunks_iter_mut(Axis(0), CHUNK);
+    for (pairs, mut rows) in pairs.chunks(CHUNK).zip(rows) {
+        directions.replace(pairs);
+        let found = &mut found[..channels * pairs.len()];
+        model.eval_into(&directions, found)?;
+        for (mut to, from) in rows
+            .columns_mut()
+            .into_iter()
+            .zip(found.chunks_exact(pairs.len()))
+        {
+            for (to, from) in to.iter_mut().zip(from) {
+                *to = from.as_f64();
+            }
         }
     }
     Ok(())
