@@ -68,8 +68,8 @@ impl Default for PriorParams {
 /// A distribution of networks, learnt from materials.
 ///
 /// ```
-/// use elm_brdf::{brdf::Fit, prior::PriorParams};
-/// use elm_datasets::geometry::pairs;
+/// use elm_brdf::{fit::Fit, prior::PriorParams};
+/// use elm_datasets::{Brdf, geometry::pairs};
 /// use elm_datasets::{Invalid, MaterialId, synthetic};
 /// use ndarray::{Array2, Axis};
 ///

@@ -13,7 +13,8 @@
 //!
 //! ```
 //! use elm_brdf::batch::{Columns, Packed};
-//! use elm_brdf::{brdf::Brdf, model::Tuned};
+//! use elm_brdf::model::Tuned;
+//! use elm_datasets::Brdf;
 //! use elm_datasets::geometry::pairs;
 //! use elm_datasets::{Invalid, MaterialId, synthetic};
 //!

@@ -50,7 +50,8 @@ pub struct BrdfParams {
 /// A fitted reflectance model.
 ///
 /// ```
-/// use elm_brdf::{brdf::{Brdf, Fit}, geometry::pairs, model::BrdfParams};
+/// use elm_brdf::{fit::Fit, model::BrdfParams};
+/// use elm_datasets::{Brdf, geometry::pairs};
 /// use elm_datasets::{Invalid, MaterialId, synthetic};
 ///
 /// let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);

@@ -71,7 +71,7 @@ use problem::Problem;
 /// for all channels.
 ///
 /// ```
-/// use elm_brdf::{brdf::Brdf, model::Tuned};
+/// use elm_brdf::{fit::Model, model::Tuned};
 /// use elm_datasets::geometry::pairs;
 /// use elm_datasets::{Invalid, MaterialId, synthetic};
 ///
