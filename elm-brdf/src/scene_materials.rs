@@ -15,6 +15,7 @@ use serde::Deserialize;
 
 use crate::batch::Packed;
 use crate::error::{Error, Result};
+use crate::export::check_precision;
 use crate::features::Features;
 use crate::fit::{Model, boxed};
 use crate::link::Link;
@@ -272,11 +273,20 @@ impl Library {
     }
 }
 
-/// A network ready for long batches, any other model as it is.
+/// A network packed for long batches, any other model as it is. In single precision, which is nearly twice
+/// as fast, where that adds no more to a model's own error than an export may, a quarter of it.
 fn packed(model: Box<dyn Model>) -> Arc<dyn Brdf> {
-    match BrdfModel::of(&*model).map(Packed::<f64>::new) {
-        Some(Ok(packed)) => Arc::new(packed),
-        _ => Arc::new(model),
+    let Some(network) = BrdfModel::of(&*model) else {
+        return Arc::new(model);
+    };
+    if check_precision(network).is_ok()
+        && let Ok(packed) = Packed::<f32>::new(network)
+    {
+        return Arc::new(packed);
+    }
+    match Packed::<f64>::new(network) {
+        Ok(packed) => Arc::new(packed),
+        Err(_) => Arc::new(model),
     }
 }
 
