@@ -11,6 +11,9 @@ const VIEWS: usize = 16;
 const THETAS: usize = 24;
 /// Steps in the azimuth between both directions, from 0 to pi.
 const PHIS: usize = 32;
+/// Steps of each cell in both angles at which the model is asked: a narrow highlight lies between the middles
+/// of cells.
+const STEPS: usize = 2;
 /// Share of the directions that are drawn by the cosine alone, so that what the table missed is
 /// found as well.
 const COSINE_SHARE: f64 = 0.1;
@@ -27,7 +30,7 @@ pub(crate) struct Proxy {
 
 /// What a table is made of: every pair at which the model is asked, by viewing angle.
 pub(crate) struct Survey {
-    /// Cell by cell: by view, theta_i and azimuth.
+    /// Cell by cell, by view, theta_i and azimuth; the steps of a cell one after another.
     pub(crate) cells: Vec<Pair>,
     /// Mirror and retro-reflection at each viewing angle, where models peak.
     pub(crate) peaks: Vec<Pair>,
@@ -39,7 +42,8 @@ impl Survey {
             incident: cartesian(theta_i, phi),
             outgoing: cartesian(theta_o, 0.0),
         };
-        let mut cells = Vec::with_capacity(VIEWS * THETAS * PHIS);
+        let middle = |step: usize| (step as f64 + 0.5) / STEPS as f64;
+        let mut cells = Vec::with_capacity(VIEWS * THETAS * PHIS * STEPS * STEPS);
         let mut peaks = Vec::with_capacity(2 * VIEWS);
         for view in 0..VIEWS {
             let theta_o = view_angle(view);
@@ -47,8 +51,11 @@ impl Survey {
             for theta in 0..THETAS {
                 let (near, far) = cosines(theta);
                 for phi in 0..PHIS {
-                    let phi = (phi as f64 + 0.5) / PHIS as f64 * PI;
-                    cells.push(pair(((near + far) / 2.0).acos(), phi, theta_o));
+                    for step in 0..STEPS * STEPS {
+                        let cosine = near + (far - near) * middle(step / STEPS);
+                        let phi = (phi as f64 + middle(step % STEPS)) / PHIS as f64 * PI;
+                        cells.push(pair(cosine.acos(), phi, theta_o));
+                    }
                 }
             }
         }
@@ -77,12 +84,13 @@ impl Proxy {
     /// From the model's values, finite and not negative, at [`Survey::cells`].
     pub(crate) fn new(values: &[f64]) -> Self {
         let (views, albedo) = values
-            .chunks_exact(THETAS * PHIS)
+            .chunks_exact(THETAS * PHIS * STEPS * STEPS)
             .map(|view| {
                 // The integral of f cos theta over each cell, both halves of the azimuth.
-                let mut weights: Vec<f64> = Vec::with_capacity(view.len());
-                let mut cosine_weights: Vec<f64> = Vec::with_capacity(view.len());
-                for (cell, f) in view.iter().enumerate() {
+                let mut weights: Vec<f64> = Vec::with_capacity(THETAS * PHIS);
+                let mut cosine_weights: Vec<f64> = Vec::with_capacity(THETAS * PHIS);
+                for (cell, steps) in view.chunks_exact(STEPS * STEPS).enumerate() {
+                    let f = steps.iter().sum::<f64>() / (STEPS * STEPS) as f64;
                     let (near, far) = cosines(cell / PHIS);
                     let projected = (near * near - far * far) / 2.0 * TAU / PHIS as f64;
                     weights.push(f * projected);
