@@ -58,11 +58,10 @@ impl Material {
         }
         let survey = Survey::new();
         let raw = |pairs: &[Pair]| -> Result<Vec<Rgb>> {
-            let values = brdf.eval(pairs)?;
-            let rows = values.rows().into_iter();
-            Ok(rows
-                .map(|row| colour(&row.to_vec(), f64::INFINITY))
-                .collect())
+            let mut room = Vec::new();
+            evaluate(&*brdf, pairs, &mut room)?;
+            let rows = room.chunks_exact(channels);
+            Ok(rows.map(|row| colour(row, f64::INFINITY)).collect())
         };
         let cells = raw(&survey.cells)?;
         let highest = cells
@@ -118,15 +117,9 @@ impl Material {
         room: &mut Vec<f64>,
         values: &mut Vec<Rgb>,
     ) -> Result<()> {
-        let channels = self.channels();
-        room.clear();
-        room.resize(pairs.len() * channels, 0.0);
-        let shape = (pairs.len(), channels);
-        if let Ok(view) = ArrayViewMut2::from_shape(shape, &mut room[..]) {
-            self.brdf.eval_into(pairs, view)?;
-        }
+        evaluate(&*self.brdf, pairs, room)?;
         values.clear();
-        let rows = room.chunks_exact(channels);
+        let rows = room.chunks_exact(self.channels());
         values.extend(rows.map(|row| times(colour(row, self.ceiling), self.factor)));
         Ok(())
     }
@@ -187,6 +180,17 @@ impl std::fmt::Debug for Material {
             .field("albedo", &self.albedo)
             .finish_non_exhaustive()
     }
+}
+
+/// The values of each pair, one pair after another, in place of what is in `room`.
+fn evaluate(brdf: &dyn Brdf, pairs: &[Pair], room: &mut Vec<f64>) -> Result<()> {
+    let shape = (pairs.len(), brdf.channels());
+    room.clear();
+    room.resize(shape.0 * shape.1, 0.0);
+    if let Ok(view) = ArrayViewMut2::from_shape(shape, &mut room[..]) {
+        brdf.eval_into(pairs, view)?;
+    }
+    Ok(())
 }
 
 /// One or three values as a colour between 0 and `ceiling`.

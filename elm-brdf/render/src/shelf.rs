@@ -3,11 +3,10 @@
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
+use crate::error::{Error, Place, Result};
 use crate::loader::{LoadError, LoadedMaterial, MaterialLoader};
 use crate::material::Material;
 use crate::scene::Scene;
-
-use crate::error::{Error, Place, Result};
 
 /// Materials by their index in the scene, in alphabetical order.
 pub(crate) struct Shelf<'a> {

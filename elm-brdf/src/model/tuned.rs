@@ -13,13 +13,13 @@ mod rows;
 mod survey;
 
 use elm::{Activation, Biases, Distribution, ElmParams, FeatureMap, Neurons, Scaler};
-use elm_datasets::brdf::EvalError;
-use ndarray::{Array2, ArrayView2, ArrayViewMut2, Axis};
+use elm_datasets::brdf::{EvalError, check_arguments};
+use ndarray::{ArrayView2, ArrayViewMut2, Axis, Slice};
 
 use super::{BrdfModel, Draw, Provenance};
 use crate::error::{Error, Result};
 use crate::features::Features;
-use crate::fit::{Fit, Model, assign, check};
+use crate::fit::{Fit, Model, check};
 use crate::metrics::Metric;
 use crate::quality;
 use elm_datasets::Brdf;
@@ -245,27 +245,27 @@ impl Fit for Tuned {
 /// Models of one channel or more each, side by side.
 pub struct SideBySide(pub(crate) Vec<BrdfModel>);
 
-impl SideBySide {
-    fn values_at(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
-        let mut values = Array2::zeros((pairs.len(), self.channels()));
-        let mut first = 0;
-        for model in &self.0 {
-            for column in model.eval(pairs)?.columns() {
-                values.column_mut(first).assign(&column);
-                first += 1;
-            }
-        }
-        Ok(values)
-    }
-}
-
 impl Brdf for SideBySide {
     fn channels(&self) -> usize {
         self.0.iter().map(Brdf::channels).sum()
     }
 
-    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
-        assign(self.values_at(pairs)?, values)
+    fn eval_into(
+        &self,
+        pairs: &[Pair],
+        mut values: ArrayViewMut2<'_, f64>,
+    ) -> Result<(), EvalError> {
+        check_arguments(pairs, &values, self.channels())?;
+        let mut first = 0;
+        for model in &self.0 {
+            let next = first + model.channels();
+            model.eval_into(
+                pairs,
+                values.slice_axis_mut(Axis(1), Slice::from(first..next)),
+            )?;
+            first = next;
+        }
+        Ok(())
     }
 }
 
