@@ -1,5 +1,6 @@
 //! Files that are there whole or not at all.
 
+use std::fs;
 use std::path::Path;
 
 use elm::persist;
@@ -13,6 +14,17 @@ use crate::error::{Error, Result};
 pub(crate) fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
     persist::replace(path, bytes).map_err(|reason| Error::Write {
         path: path.to_owned(),
+        reason,
+    })
+}
+
+/// Makes a folder, and those above it, unless it is there.
+///
+/// # Errors
+/// [`Error::Write`] naming the folder.
+pub(crate) fn folder(dir: &Path) -> Result<()> {
+    fs::create_dir_all(dir).map_err(|reason| Error::Write {
+        path: dir.to_owned(),
         reason,
     })
 }

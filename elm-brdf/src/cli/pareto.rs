@@ -293,10 +293,7 @@ fn of_materials(arguments: &Arguments) -> Result<Subject, Failure> {
 }
 
 fn write(dir: &Path, title: &str, metric: Metric, points: &[Point]) -> Result<(), Failure> {
-    std::fs::create_dir_all(dir).map_err(|reason| Error::Write {
-        path: dir.to_owned(),
-        reason,
-    })?;
+    file::folder(dir)?;
     let failed = |path: &Path, reason: std::io::Error| Error::Write {
         path: path.to_owned(),
         reason,

@@ -205,7 +205,9 @@ pub fn curet(
     }
     for (description, bytes) in &fetched {
         let path = dir.join(description.file);
-        put(dir, &path, bytes).map_err(|reason| Error::Write { path, reason })?;
+        fs::create_dir_all(dir)
+            .and_then(|()| elm::persist::replace(&path, bytes))
+            .map_err(|reason| Error::Write { path, reason })?;
     }
     Ok(fetched.into_iter().map(|(file, _)| file).collect())
 }
@@ -290,10 +292,4 @@ fn hexadecimal(bytes: &[u8]) -> String {
         let _ = write!(text, "{byte:02x}");
         text
     })
-}
-
-/// The whole file, in a folder that is made if it is not there.
-fn put(dir: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
-    fs::create_dir_all(dir)?;
-    elm::persist::replace(path, bytes)
 }

@@ -127,10 +127,7 @@ pub fn write(
     size: u32,
     mut done: impl FnMut(usize),
 ) -> Result<()> {
-    std::fs::create_dir_all(dir).map_err(|reason| Error::Write {
-        path: dir.to_owned(),
-        reason,
-    })?;
+    file::folder(dir)?;
     let mut cards = Vec::with_capacity(exhibits.len());
     for (index, exhibit) in exhibits.iter().enumerate() {
         let picture = format!("sphere-{:02}.png", index + 1);

@@ -5,15 +5,14 @@ mod csv;
 pub mod plot;
 mod tables;
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use elm::persist::replace;
 use elm_datasets::{MaterialId, Measurements, Origin, Samples};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use crate::file;
 use crate::metrics::Metrics;
 use crate::protocol::{MaterialScores, Scores};
 use crate::published;
@@ -282,18 +281,12 @@ impl Report {
     /// # Errors
     /// [`Error::Write`] naming the file or folder.
     pub fn write(&self, dir: &Path) -> Result<Vec<PathBuf>> {
-        fs::create_dir_all(dir).map_err(|reason| Error::Write {
-            path: dir.to_owned(),
-            reason,
-        })?;
+        file::folder(dir)?;
         Format::ALL
             .into_iter()
             .map(|format| {
                 let path = dir.join("reproduce").with_extension(format.extension());
-                replace(&path, self.render(format)?.as_bytes()).map_err(|reason| Error::Write {
-                    path: path.clone(),
-                    reason,
-                })?;
+                file::replace(&path, self.render(format)?.as_bytes())?;
                 Ok(path)
             })
             .collect()

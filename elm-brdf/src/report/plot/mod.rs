@@ -18,7 +18,6 @@ mod lobes;
 mod scatter;
 
 use std::fmt::Display;
-use std::fs;
 use std::io::{self, Cursor};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -31,8 +30,9 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
 
-use super::{mean, paper, replace};
+use super::{mean, paper};
 use crate::error::{Error, Result};
+use crate::file;
 use crate::fit::Fit;
 use crate::pareto::Point;
 use crate::protocol::MaterialScores;
@@ -219,15 +219,15 @@ fn save(chart: &impl Chart, dir: &Path, name: &str) -> Result<Vec<PathBuf>> {
         path: path.to_owned(),
         reason,
     };
-    fs::create_dir_all(dir).map_err(|reason| failed(dir, reason))?;
+    file::folder(dir)?;
     let (vector, bitmap) = (
         dir.join(format!("{name}.svg")),
         dir.join(format!("{name}.png")),
     );
     let svg = svg(chart).map_err(|reason| failed(&vector, reason))?;
-    replace(&vector, svg.as_bytes()).map_err(|reason| failed(&vector, reason))?;
+    file::replace(&vector, svg.as_bytes())?;
     let png = png(chart).map_err(|reason| failed(&bitmap, reason))?;
-    replace(&bitmap, &png).map_err(|reason| failed(&bitmap, reason))?;
+    file::replace(&bitmap, &png)?;
     Ok(vec![vector, bitmap])
 }
 
@@ -337,7 +337,7 @@ mod tests {
         files.extend(write_lobes(dir.path(), "stand-in, ggx", &[panel]).unwrap());
         assert_eq!(files.len(), 8);
         for file in &files {
-            let bytes = fs::read(file).unwrap();
+            let bytes = std::fs::read(file).unwrap();
             if file.extension().unwrap() == "png" {
                 let image = image::load_from_memory(&bytes).unwrap().to_rgb8();
                 // Neither blank nor black: text and lines are a small share of the pixels.
@@ -355,9 +355,9 @@ mod tests {
                 );
             }
         }
-        let before = fs::read(&files[0]).unwrap();
+        let before = std::fs::read(&files[0]).unwrap();
         write(dir.path(), "stand-in, ggx", &shown).unwrap();
-        assert_eq!(before, fs::read(&files[0]).unwrap());
+        assert_eq!(before, std::fs::read(&files[0]).unwrap());
     }
 
     #[test]
