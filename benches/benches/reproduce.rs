@@ -7,7 +7,6 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use elm_brdf::fit::Fit;
 use elm_brdf::model::{BrdfModel, BrdfParams, ScaledOnce};
 use elm_brdf::protocol::{Folds, cross_validate};
-use elm_datasets::geometry::pairs;
 use elm_datasets::{Invalid, MaterialId, Measurements, synthetic};
 use ndarray::{Axis, concatenate};
 
@@ -45,7 +44,7 @@ fn reproduce(criterion: &mut Criterion) {
     let Ok(values) = concatenate(Axis(1), &values) else {
         return;
     };
-    let pairs = pairs(&together.directions);
+    let pairs = &together.directions;
     let labels: Vec<usize> = (0..pairs.len()).map(|row| folds.of_row(row)).collect();
     for (name, once) in [
         ("fits, fold by fold", false),

@@ -14,7 +14,7 @@ use ndarray::ArrayView2;
 
 use crate::error::Result;
 use elm_datasets::Brdf;
-use elm_datasets::geometry::{Pair, cartesian};
+use elm_datasets::geometry::{DirectionPair, cartesian};
 
 /// The angles of the light, in degrees, at which a fit looks at the albedo.
 pub const ANGLES: [f64; 7] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0];
@@ -27,7 +27,7 @@ const TURNS: usize = 24;
 /// A node of the quadrature: a pair of directions, and what the value there counts in the albedo.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Node {
-    pub(crate) pair: Pair,
+    pub(crate) pair: DirectionPair,
     pub(crate) weight: f64,
 }
 
@@ -65,7 +65,7 @@ pub(crate) fn nodes(theta: f64) -> Vec<Node> {
                 // Both halves of the turn.
                 let measure = 2.0 * sin_psi * step * PI / TURNS as f64;
                 nodes.push(Node {
-                    pair: Pair { incident, outgoing },
+                    pair: DirectionPair { incident, outgoing },
                     weight: share * measure * outgoing[2],
                 });
             }
@@ -92,7 +92,7 @@ pub(crate) fn nodes(theta: f64) -> Vec<Node> {
 /// Those of [`Brdf::eval`].
 pub fn directional(brdf: &dyn Brdf, theta: f64) -> Result<Vec<f64>> {
     let nodes = nodes(theta);
-    let pairs: Vec<Pair> = nodes.iter().map(|node| node.pair).collect();
+    let pairs: Vec<DirectionPair> = nodes.iter().map(|node| node.pair).collect();
     Ok(sums(&nodes, brdf.eval(&pairs)?.view()))
 }
 
@@ -123,7 +123,7 @@ mod tests {
 
         fn eval_into(
             &self,
-            pairs: &[Pair],
+            pairs: &[DirectionPair],
             mut values: ArrayViewMut2<'_, f64>,
         ) -> Result<(), EvalError> {
             for (value, pair) in values.iter_mut().zip(pairs) {
@@ -141,8 +141,8 @@ mod tests {
         let mut sum = 0.0;
         for row in 0..steps {
             let theta_o = ((f64::from(row) + 0.5) / f64::from(steps)).sqrt().asin();
-            let pairs: Vec<Pair> = (0..steps)
-                .map(|column| Pair {
+            let pairs: Vec<DirectionPair> = (0..steps)
+                .map(|column| DirectionPair {
                     incident: cartesian(theta, 0.0),
                     outgoing: cartesian(theta_o, (f64::from(column) + 0.5) / f64::from(steps) * PI),
                 })

@@ -7,7 +7,7 @@ use ndarray::{Array2, ArrayViewMut1};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use elm_datasets::geometry::{NORMAL, Pair, Vector, dot, reflect};
+use elm_datasets::geometry::{DirectionPair, NORMAL, Vector, dot, reflect};
 
 /// A set of network inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -140,7 +140,7 @@ impl Features {
     /// an isotropic surface does. Finite for every pair of unit vectors, those below the horizon,
     /// grazing or coincident included.
     #[must_use]
-    pub fn compute(self, pairs: &[Pair]) -> Array2<f64> {
+    pub fn compute(self, pairs: &[DirectionPair]) -> Array2<f64> {
         let mut out = Array2::zeros((pairs.len(), self.inputs().len()));
         let fill = |mut row: ArrayViewMut1<'_, f64>, values: &[f64]| {
             row.iter_mut()
@@ -166,7 +166,7 @@ impl Features {
     /// rounding of its formula, as where all directions lie at one angle, is made equal in all of
     /// them: what is standardised by its deviation would take the rounding for a feature.
     #[must_use]
-    pub fn compute_training(self, pairs: &[Pair]) -> Array2<f64> {
+    pub fn compute_training(self, pairs: &[DirectionPair]) -> Array2<f64> {
         // Inputs are of order one.
         const ROUNDING: f64 = 1e-12;
         let mut x = self.compute(pairs);
@@ -182,7 +182,7 @@ impl Features {
     }
 }
 
-fn paper(pair: &Pair) -> [f64; 6] {
+fn paper(pair: &DirectionPair) -> [f64; 6] {
     let (l, v) = (pair.incident, pair.outgoing);
     let sine = |w: Vector| w[0].hypot(w[1]);
     [
@@ -195,7 +195,7 @@ fn paper(pair: &Pair) -> [f64; 6] {
     ]
 }
 
-fn half_diff(pair: &Pair) -> [f64; 5] {
+fn half_diff(pair: &DirectionPair) -> [f64; 5] {
     let (l, v) = (pair.incident, pair.outgoing);
     let angles = pair.half_difference();
     [
@@ -207,7 +207,7 @@ fn half_diff(pair: &Pair) -> [f64; 5] {
     ]
 }
 
-fn cosines(pair: &Pair) -> [f64; 4] {
+fn cosines(pair: &DirectionPair) -> [f64; 4] {
     let angles = pair.half_difference();
     [
         angles.cos_theta_h(),
@@ -217,17 +217,17 @@ fn cosines(pair: &Pair) -> [f64; 4] {
     ]
 }
 
-fn sum_difference(pair: &Pair) -> [f64; 4] {
+fn sum_difference(pair: &DirectionPair) -> [f64; 4] {
     let [cos_h, cos_d, cos_i, cos_o] = cosines(pair);
     [cos_h, cos_d, cos_i + cos_o, cos_o - cos_i]
 }
 
-fn reciprocal_cosines(pair: &Pair) -> [f64; 4] {
+fn reciprocal_cosines(pair: &DirectionPair) -> [f64; 4] {
     let [cos_h, cos_d, cos_i, cos_o] = cosines(pair);
     [cos_h, cos_d, cos_i + cos_o, cos_i * cos_o]
 }
 
-fn highlight(pair: &Pair) -> [f64; 4] {
+fn highlight(pair: &DirectionPair) -> [f64; 4] {
     let angles = pair.half_difference();
     let (cos_i, cos_o) = (pair.incident[2], pair.outgoing[2]);
     [
@@ -238,7 +238,7 @@ fn highlight(pair: &Pair) -> [f64; 4] {
     ]
 }
 
-fn highlight_cosines(pair: &Pair) -> [f64; 4] {
+fn highlight_cosines(pair: &DirectionPair) -> [f64; 4] {
     let angles = pair.half_difference();
     [
         angles.theta_h().sqrt(),
@@ -248,7 +248,7 @@ fn highlight_cosines(pair: &Pair) -> [f64; 4] {
     ]
 }
 
-fn algebraic(pair: &Pair) -> [f64; 3] {
+fn algebraic(pair: &DirectionPair) -> [f64; 3] {
     let angles = pair.half_difference();
     let cosine = angles.cos_theta_d();
     [
@@ -290,7 +290,7 @@ mod tests {
     fn the_papers_inputs_at_hand_computed_directions() {
         // Light at 30 degrees, viewer at 60 on the other side: R lies at 30 on the viewer's side,
         // 30 degrees from V.
-        let pair = Pair {
+        let pair = DirectionPair {
             incident: cartesian(FRAC_PI_6, 0.0),
             outgoing: cartesian(FRAC_PI_3, PI),
         };
@@ -304,7 +304,7 @@ mod tests {
     fn the_other_sets_at_hand_computed_directions() {
         // Retro-reflection at 60 degrees: the half vector is the direction itself.
         let direction = cartesian(FRAC_PI_3, 0.4);
-        let pair = Pair {
+        let pair = DirectionPair {
             incident: direction,
             outgoing: direction,
         };
@@ -333,7 +333,7 @@ mod tests {
         let below = [0.0, 0.6, -0.8];
         for incident in [normal, horizon, opposite, below] {
             for outgoing in [normal, horizon, opposite, below] {
-                let pair = Pair { incident, outgoing };
+                let pair = DirectionPair { incident, outgoing };
                 for set in Features::ALL {
                     let x = set.compute(&[pair]);
                     assert_eq!(x.ncols(), set.inputs().len());
@@ -346,8 +346,8 @@ mod tests {
     #[test]
     fn an_angle_common_to_all_directions_is_a_constant_input() {
         // Light and viewer turned together: every input is constant, to rounding.
-        let pairs: Vec<Pair> = (0..50)
-            .map(|turn| Pair {
+        let pairs: Vec<DirectionPair> = (0..50)
+            .map(|turn| DirectionPair {
                 incident: cartesian(FRAC_PI_6, 0.1 * f64::from(turn)),
                 outgoing: cartesian(FRAC_PI_3, 0.1 * f64::from(turn) + 1.0),
             })
@@ -364,7 +364,7 @@ mod tests {
             theta_i in 0.0..FRAC_PI_2, phi_i in -PI..PI,
             theta_o in 0.0..FRAC_PI_2, phi_o in -PI..PI, turn in -PI..PI,
         ) {
-            let pair = |turn: f64, sign: f64| Pair {
+            let pair = |turn: f64, sign: f64| DirectionPair {
                 incident: cartesian(theta_i, sign * (phi_i + turn)),
                 outgoing: cartesian(theta_o, sign * (phi_o + turn)),
             };

@@ -2,7 +2,7 @@
 
 use elm_datasets::Brdf;
 use elm_datasets::brdf::{ArgumentError, EvalError};
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 use ndarray::{Array2, ArrayView2, ArrayViewMut2, Axis};
 
 use crate::error::{Error, Result};
@@ -51,7 +51,7 @@ pub trait Fit: Send + Sync {
     ///
     /// # Errors
     /// Where these measurements cannot be fitted.
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model>;
+    fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model>;
 
     /// What the fit without each fold predicts at **all** pairs, those of the fold and those that
     /// it was fitted to: one array of shape (pairs, channels) per fold. `folds` has the fold of
@@ -63,7 +63,7 @@ pub trait Fit: Send + Sync {
     /// Those of [`fit`](Self::fit) and of [`Brdf::eval`].
     fn cross_fits(
         &self,
-        pairs: &[Pair],
+        pairs: &[DirectionPair],
         values: ArrayView2<'_, f64>,
         folds: &[usize],
         count: usize,
@@ -72,7 +72,7 @@ pub trait Fit: Send + Sync {
         let without = |fold: usize| {
             let other = |row: &usize| folds.get(*row) != Some(&fold);
             let left: Vec<usize> = (0..pairs.len()).filter(other).collect();
-            let left_pairs: Vec<Pair> = left.iter().map(|&row| pairs[row]).collect();
+            let left_pairs: Vec<DirectionPair> = left.iter().map(|&row| pairs[row]).collect();
             let model = self.fit(&left_pairs, values.select(Axis(0), &left).view())?;
             let predicted = model.eval(pairs)?;
             done(fold + 1);
@@ -95,13 +95,13 @@ struct Boxed<F>(F);
 impl<F: Fit + 'static> Fit for Boxed<F> {
     type Model = Box<dyn Model>;
 
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+    fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         Ok(Box::new(self.0.fit(pairs, values)?))
     }
 
     fn cross_fits(
         &self,
-        pairs: &[Pair],
+        pairs: &[DirectionPair],
         values: ArrayView2<'_, f64>,
         folds: &[usize],
         count: usize,
@@ -113,7 +113,7 @@ impl<F: Fit + 'static> Fit for Boxed<F> {
 
 /// What every method asks of measurements: at least one, one row of values per pair of
 /// directions, and all numbers finite.
-pub(crate) fn check(pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<()> {
+pub(crate) fn check(pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<()> {
     if values.is_empty() {
         return Err(Error::Empty {
             what: "measurements",

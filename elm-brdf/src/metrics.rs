@@ -9,7 +9,7 @@ use ndarray::{Array1, ArrayView2, aview1};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// The measure that a fit makes small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -116,10 +116,10 @@ impl Metrics {
     ///
     /// ```
     /// use elm_brdf::metrics::Metrics;
-    /// use elm_datasets::geometry::{Pair, cartesian};
+    /// use elm_datasets::geometry::{DirectionPair, cartesian};
     /// use ndarray::array;
     ///
-    /// let pair = Pair { incident: cartesian(0.3, 0.0), outgoing: cartesian(0.0, 0.0) };
+    /// let pair = DirectionPair { incident: cartesian(0.3, 0.0), outgoing: cartesian(0.0, 0.0) };
     /// let metrics = Metrics::of(&[pair], array![[0.5, 1.0]].view(), array![[0.5, 2.0]].view())?;
     /// assert_eq!(metrics.mae, 0.5);
     /// // The first channel agrees; ln 3 - ln 2 in the second.
@@ -127,7 +127,7 @@ impl Metrics {
     /// # Ok::<(), elm_brdf::Error>(())
     /// ```
     pub fn of(
-        pairs: &[Pair],
+        pairs: &[DirectionPair],
         predicted: ArrayView2<'_, f64>,
         truth: ArrayView2<'_, f64>,
     ) -> Result<Self> {
@@ -195,7 +195,7 @@ pub(crate) struct Truth {
 
 impl Truth {
     /// Of values of shape (pairs, channels), which are taken row by row.
-    pub(crate) fn new(pairs: &[Pair], values: ArrayView2<'_, f64>) -> Self {
+    pub(crate) fn new(pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Self {
         let cosines = pairs.iter().map(|pair| pair.outgoing[2].max(0.0));
         Self {
             cosines: cosines
@@ -290,8 +290,8 @@ mod tests {
     use elm_datasets::geometry::cartesian;
     use ndarray::{Array2, array};
 
-    fn seen_at(theta_o: f64) -> Pair {
-        Pair {
+    fn seen_at(theta_o: f64) -> DirectionPair {
+        DirectionPair {
             incident: cartesian(0.2, 0.0),
             outgoing: cartesian(theta_o, 1.0),
         }

@@ -36,7 +36,7 @@ use crate::fit::{Fit, check};
 use crate::link::Link;
 use crate::metrics::Metrics;
 use crate::model::{BrdfModel, Draw, Layer};
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// How a [`Prior`] is built.
 ///
@@ -69,13 +69,13 @@ impl Default for PriorParams {
 ///
 /// ```
 /// use elm_brdf::{fit::Fit, prior::PriorParams};
-/// use elm_datasets::{Brdf, geometry::pairs};
+/// use elm_datasets::Brdf;
 /// use elm_datasets::{Invalid, MaterialId, synthetic};
 /// use ndarray::{Array2, Axis};
 ///
 /// let ids: Vec<MaterialId> = MaterialId::all().take(12).collect();
 /// let data = synthetic::measurements(1, &ids, Invalid::Clamp);
-/// let pairs = pairs(&data.directions);
+/// let pairs = &data.directions;
 /// // The first channel of every material, the first of which is the new one.
 /// let values = Array2::from_shape_fn((205, 12), |(row, m)| data.materials[m].values[[row, 0]]);
 /// let prior = PriorParams::default().build(&pairs, values.view())?.without(&[0])?;
@@ -128,7 +128,7 @@ impl PriorParams {
     /// # Errors
     /// Where these materials cannot be fitted; [`Error::Shape`] of a single material, which has
     /// no spread.
-    pub fn build(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Prior> {
+    pub fn build(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Prior> {
         check(pairs, values)?;
         if values.ncols() < 2 {
             return Err(Error::Shape {
@@ -254,7 +254,11 @@ impl Prior {
     ///
     /// # Errors
     /// Where these measurements cannot be fitted.
-    pub fn fit_model(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<BrdfModel> {
+    pub fn fit_model(
+        &self,
+        pairs: &[DirectionPair],
+        values: ArrayView2<'_, f64>,
+    ) -> Result<BrdfModel> {
         let mut left_out = Array2::zeros(values.dim());
         let model = self.fit_judged(pairs, values, Some(&mut left_out))?;
         let link = model.link();
@@ -268,7 +272,7 @@ impl Prior {
     /// factorisations of their own.
     pub(crate) fn fit_judged(
         &self,
-        pairs: &[Pair],
+        pairs: &[DirectionPair],
         values: ArrayView2<'_, f64>,
         mut left_out: Option<&mut Array2<f64>>,
     ) -> Result<BrdfModel> {
@@ -337,7 +341,7 @@ impl Prior {
 impl Fit for Prior {
     type Model = BrdfModel;
 
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+    fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         // Each channel has strengths of its own, so that one network serves them.
         self.fit_judged(pairs, values, None)
     }

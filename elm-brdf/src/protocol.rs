@@ -1,7 +1,7 @@
 //! k-fold cross-validation of anything that can be fitted to measurements.
 
 use elm::Stream;
-use elm_datasets::{Directions, Material, MaterialId, Measurements, Samples};
+use elm_datasets::{Material, MaterialId, Measurements, Samples};
 use ndarray::{Array2, ArrayView2, Axis, Slice, concatenate};
 use rand::seq::SliceRandom;
 
@@ -12,7 +12,7 @@ use crate::model::SideBySide;
 use crate::prior::{Prior, PriorParams};
 use crate::quality::{self, NoiseFloor};
 use crate::streams::generator;
-use elm_datasets::geometry::{self, Pair};
+use elm_datasets::geometry::DirectionPair;
 
 /// Which fold each measurement is held out in: a seeded shuffle, dealt into folds whose sizes
 /// differ by at most one.
@@ -155,7 +155,7 @@ pub fn cross_validate_samples(
     let rows: Vec<usize> = (0..samples.directions.len()).collect();
     let group = Group {
         rows: &rows,
-        pairs: geometry::pairs(&samples.directions),
+        pairs: samples.directions.clone(),
         values: samples.values.clone(),
     };
     let (predicted, channels) =
@@ -189,7 +189,7 @@ pub fn cross_validate_pooled(
         .iter()
         .filter(|material| material.rows.len() == pool.directions.len())
         .collect();
-    let pairs = geometry::pairs(&pool.directions);
+    let pairs = &pool.directions;
     let priors = (0..data.channels.len())
         .map(|channel| {
             let mut values = Array2::zeros((pairs.len(), whole.len()));
@@ -221,7 +221,7 @@ struct ByChannel(Vec<Prior>);
 impl Fit for ByChannel {
     type Model = SideBySide;
 
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+    fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         let columns = values.axis_chunks_iter(Axis(1), 1);
         let models = self
             .0
@@ -251,13 +251,13 @@ fn groups(materials: &[Material]) -> Vec<Vec<usize>> {
 struct Group<'a> {
     /// Index of each measurement in the whole rig.
     rows: &'a [usize],
-    pairs: Vec<Pair>,
+    pairs: Vec<DirectionPair>,
     /// Shape (rows, channels of all materials).
     values: Array2<f64>,
 }
 
 impl<'a> Group<'a> {
-    fn new(materials: &[&'a Material], directions: &[Directions]) -> Result<Self> {
+    fn new(materials: &[&'a Material], directions: &[DirectionPair]) -> Result<Self> {
         let rows: &[usize] = materials.first().map_or(&[], |material| &material.rows);
         let views: Vec<_> = materials
             .iter()
@@ -270,10 +270,7 @@ impl<'a> Group<'a> {
         })?;
         Ok(Self {
             rows,
-            pairs: rows
-                .iter()
-                .map(|&row| Pair::from(&directions[row]))
-                .collect(),
+            pairs: rows.iter().map(|&row| directions[row]).collect(),
             values,
         })
     }

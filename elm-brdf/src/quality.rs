@@ -4,7 +4,7 @@
 use ndarray::ArrayView1;
 use serde::{Deserialize, Serialize};
 
-use elm_datasets::geometry::{Pair, dot};
+use elm_datasets::geometry::{DirectionPair, dot};
 
 /// How far cosines of exchanged directions may lie apart: far more than six printed decimals of
 /// an angle, far less than the steps between different measurements of a rig.
@@ -50,8 +50,8 @@ impl NoiseFloor {
 /// Whether light, viewer and normal lie in one plane in all of these pairs, to half a degree: what
 /// a surface looks like from beside the plane of incidence is then not known.
 #[must_use]
-pub fn in_one_plane(pairs: &[Pair]) -> bool {
-    let across = |pair: &Pair| {
+pub fn in_one_plane(pairs: &[DirectionPair]) -> bool {
+    let across = |pair: &DirectionPair| {
         let (l, v) = (pair.incident, pair.outgoing);
         (l[0] * v[1] - l[1] * v[0]).abs()
     };
@@ -65,7 +65,7 @@ pub fn in_one_plane(pairs: &[Pair]) -> bool {
 /// Directions that are their own exchange, with light and viewer equally far from the normal, say
 /// nothing about noise and are left out.
 #[must_use]
-pub fn exchanged(pairs: &[Pair]) -> Vec<(usize, usize)> {
+pub fn exchanged(pairs: &[DirectionPair]) -> Vec<(usize, usize)> {
     let near = |a: f64, b: f64| (a - b).abs() <= TOLERANCE;
     // By the light, so that few candidates are left for each.
     let mut order: Vec<usize> = (0..pairs.len()).collect();
@@ -105,7 +105,7 @@ pub fn exchanged(pairs: &[Pair]) -> Vec<(usize, usize)> {
 ///
 /// What saturates gently, or in a single measurement, is not found.
 #[must_use]
-pub fn saturated(pairs: &[Pair], values: ArrayView1<'_, f64>) -> Vec<usize> {
+pub fn saturated(pairs: &[DirectionPair], values: ArrayView1<'_, f64>) -> Vec<usize> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let Some(&median) = sorted.get(sorted.len() / 2) else {
@@ -132,13 +132,13 @@ pub fn saturated(pairs: &[Pair], values: ArrayView1<'_, f64>) -> Vec<usize> {
 mod tests {
     use super::*;
     use approx::assert_abs_diff_eq;
-    use elm_datasets::geometry::{cartesian, pairs};
+    use elm_datasets::geometry::cartesian;
     use elm_datasets::lobes;
     use elm_datasets::{Invalid, MaterialId, curet::rig, synthetic};
     use ndarray::{Array1, array};
 
-    fn pair(theta_i: f64, theta_o: f64, phi: f64) -> Pair {
-        Pair {
+    fn pair(theta_i: f64, theta_o: f64, phi: f64) -> DirectionPair {
+        DirectionPair {
             incident: cartesian(theta_i, 0.4),
             outgoing: cartesian(theta_o, 0.4 + phi),
         }
@@ -147,7 +147,7 @@ mod tests {
     #[test]
     fn one_plane_is_told_from_all_others() {
         use std::f64::consts::PI;
-        let plane: Vec<Pair> = (0..80)
+        let plane: Vec<DirectionPair> = (0..80)
             .map(|row| {
                 pair(
                     f64::from(row) / 60.0,
@@ -180,7 +180,7 @@ mod tests {
     #[test]
     fn the_rig_has_thirty_exchanged_pairs() {
         // Counted on the database's own table of directions by an independent program.
-        assert_eq!(exchanged(&pairs(&rig::directions())).len(), 30);
+        assert_eq!(exchanged(&rig::directions()).len(), 30);
     }
 
     #[test]
@@ -198,7 +198,7 @@ mod tests {
     fn the_noise_floor_finds_the_noise_put_in() {
         // The stand-in's material 13 and its like are dark; 5 is matte, with 4.1 % of noise.
         let data = synthetic::measurements(1, &[MaterialId::new(5).unwrap()], Invalid::Keep);
-        let pairs = pairs(&data.directions);
+        let pairs = &data.directions;
         let red = data.materials[0].values.column(0);
         let floor = NoiseFloor::of(&exchanged(&pairs), red).unwrap();
         let level = (red.mapv(|v| v * v).sum() / red.len() as f64).sqrt();
@@ -212,10 +212,9 @@ mod tests {
 
     /// A glossy surface in the rig, its radiance cut off at this share of its largest.
     fn cut_at(share: f64) -> Vec<usize> {
-        let directions = rig::directions();
-        let pairs = pairs(&directions);
+        let pairs = rig::directions();
         let glossy = |d| lobes::lambert(d, 0.2) + lobes::ward(d, 0.1, 0.3);
-        let exact: Array1<f64> = directions.iter().map(glossy).collect();
+        let exact: Array1<f64> = pairs.iter().map(glossy).collect();
         let radiance = |row: usize| exact[row] * pairs[row].incident[2];
         let largest = (0..exact.len()).map(radiance).fold(0.0, f64::max);
         let values = Array1::from_shape_fn(exact.len(), |row| {
@@ -236,7 +235,7 @@ mod tests {
 
     #[test]
     fn surfaces_without_highlights_are_not_suspected() {
-        let pairs = pairs(&rig::directions());
+        let pairs = rig::directions();
         for value in [0.0, 0.3] {
             let values = Array1::from_elem(pairs.len(), value);
             assert!(saturated(&pairs, values.view()).is_empty());

@@ -6,7 +6,7 @@ use ndarray::ArrayView2;
 use crate::error::Result;
 use crate::fit::{AnyFit, Fit, boxed};
 use crate::model::{BrdfModel, Tuned};
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// Chooses a network, given how many neurons are asked for, if that is said.
 pub type Recipe = dyn Fn(Option<usize>) -> Box<AnyFit> + Send + Sync;
@@ -31,7 +31,7 @@ pub struct Joint(
 impl Fit for Joint {
     type Model = BrdfModel;
 
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<BrdfModel> {
+    fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<BrdfModel> {
         self.0.fit_model(pairs, values)
     }
 }

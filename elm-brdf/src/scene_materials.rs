@@ -5,7 +5,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use elm_brdf_render::{LoadError, LoadedMaterial, MaterialLoader};
 use elm_datasets::Brdf;
-use elm_datasets::geometry::pairs;
 use elm_datasets::lobes::Formula;
 use elm_datasets::merl::Merl;
 use elm_datasets::rgl::Rgl;
@@ -194,7 +193,7 @@ impl Library {
                 (boxed(family), format!("{name} fitted to"))
             }
         };
-        let model = method.fit(&pairs(&samples.directions), samples.values.view())?;
+        let model = method.fit(&samples.directions, samples.values.view())?;
         Ok(Fitted {
             model,
             origin: format!("{how} {data}"),

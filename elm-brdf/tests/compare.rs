@@ -52,6 +52,7 @@ fn paint_csv(program: &Program, rows: usize) -> String {
     let paint = elm_datasets::paint::samples(rows, 2).unwrap();
     let mut text = "theta_i,phi_i,theta_o,phi_o,red,green,blue\n".to_owned();
     for (d, v) in paint.directions.iter().zip(paint.values.rows()) {
+        let d = elm_datasets::Angles::of(d);
         let numbers = [d.theta_i, d.phi_i, d.theta_o, d.phi_o, v[0], v[1], v[2]];
         text.push_str(&numbers.map(|number| number.to_string()).join(","));
         text.push('\n');

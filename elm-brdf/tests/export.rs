@@ -23,7 +23,7 @@ use elm_brdf::model::{BrdfModel, BrdfParams};
 use elm_brdf::recipes;
 use elm_datasets::Brdf;
 use elm_datasets::brdf::EvalError;
-use elm_datasets::geometry::{Pair, cartesian, pairs};
+use elm_datasets::geometry::{DirectionPair, cartesian};
 use elm_datasets::merl::{Merl, cell};
 use elm_datasets::{Invalid, MaterialId, Samples, synthetic};
 use ndarray::ArrayViewMut2;
@@ -87,7 +87,7 @@ fn models() -> Vec<(String, Box<dyn Brdf>)> {
         .and(Neurons::radial(6).scale(0.2));
     add(Features::Highlight, log, mixed, 3);
     let samples = samples(7);
-    let pairs = pairs(&samples.directions);
+    let pairs = &samples.directions;
     let mut models: Vec<(String, Box<dyn Brdf>)> = all
         .into_iter()
         .enumerate()
@@ -106,9 +106,9 @@ fn models() -> Vec<(String, Box<dyn Brdf>)> {
 }
 
 /// Random pairs and every special one, in single precision as the exports take them.
-fn directions() -> Vec<Pair> {
+fn directions() -> Vec<DirectionPair> {
     let mut random = ChaCha8Rng::seed_from_u64(5);
-    let mut pairs: Vec<Pair> = (0..400)
+    let mut pairs: Vec<DirectionPair> = (0..400)
         .map(|_| {
             let mut direction = || {
                 cartesian(
@@ -116,7 +116,7 @@ fn directions() -> Vec<Pair> {
                     random.random_range(-3.2..3.2),
                 )
             };
-            Pair {
+            DirectionPair {
                 incident: direction(),
                 outgoing: direction(),
             }
@@ -131,12 +131,12 @@ fn directions() -> Vec<Pair> {
             (at(0.0), [0.0, 0.0, 1.0]),
             ([0.0, 0.0, -1.0], at(0.0)),
         ] {
-            pairs.push(Pair { incident, outgoing });
+            pairs.push(DirectionPair { incident, outgoing });
         }
     }
     let single = |w: [f64; 3]| w.map(|c| f64::from(c as f32));
     for pair in &mut pairs {
-        *pair = Pair {
+        *pair = DirectionPair {
             incident: single(pair.incident),
             outgoing: single(pair.outgoing),
         };
@@ -145,7 +145,7 @@ fn directions() -> Vec<Pair> {
 }
 
 /// What the export should say: the model's value, or black.
-fn expected(model: &dyn Brdf, pairs: &[Pair]) -> Vec<[f64; 3]> {
+fn expected(model: &dyn Brdf, pairs: &[DirectionPair]) -> Vec<[f64; 3]> {
     let values = model.eval(pairs).unwrap();
     values
         .rows()
@@ -171,7 +171,7 @@ const EPS: f64 = 5.960_464_477_539_063e-8;
 /// exp is allowed the (3 + 2 |x|) units (2 EPS each) that WGSL and Vulkan allow, so that a saturating
 /// activation, which takes exp of -2|z|, is off by at most 8 EPS; inputs are a handful of
 /// correctly rounded operations and the arc tangent, 16 EPS with theirs.
-fn bounds(model: &BrdfModel, pairs: &[Pair]) -> Vec<Option<[f64; 3]>> {
+fn bounds(model: &BrdfModel, pairs: &[DirectionPair]) -> Vec<Option<[f64; 3]>> {
     let network = model.network();
     let hidden = network.hidden();
     let (inputs, neurons) = (network.inputs(), hidden.neurons());
@@ -272,7 +272,7 @@ fn reach(model: &BrdfModel, channel: usize, value: f64, t_error: f64) -> f64 {
 }
 
 /// Holds what an evaluation found against the model, and returns the largest relative error.
-fn check(name: &str, model: &dyn Brdf, pairs: &[Pair], found: &[[f64; 3]]) -> f64 {
+fn check(name: &str, model: &dyn Brdf, pairs: &[DirectionPair], found: &[[f64; 3]]) -> f64 {
     assert_eq!(found.len(), pairs.len(), "{name}");
     let expected = expected(model, pairs);
     let bounds = bounds(BrdfModel::of(model).unwrap(), pairs);
@@ -559,7 +559,7 @@ impl Brdf for Grey {
 
     fn eval_into(
         &self,
-        pairs: &[Pair],
+        pairs: &[DirectionPair],
         mut values: ArrayViewMut2<'_, f64>,
     ) -> Result<(), EvalError> {
         for (value, pair) in values.iter_mut().zip(pairs) {
@@ -578,12 +578,11 @@ fn merl_tables_hold_the_models_values_at_the_middle_of_every_cell() {
         let table = Merl::read(&path).unwrap();
         let mut compared = 0;
         for index in (0..90 * 90 * 180).step_by(997) {
-            let Some(directions) = cell(index / 180 / 90, index / 180 % 90, index % 180) else {
+            let Some(pair) = cell(index / 180 / 90, index / 180 % 90, index % 180) else {
                 continue;
             };
-            let pair = Pair::from(&directions);
             let value = model.eval(&[pair, pair.swapped()]).unwrap();
-            let found = table.at(&directions);
+            let found = table.at(&pair);
             for c in 0..3 {
                 // Both are one cell.
                 let of = |row: usize| value[[row, c.min(value.ncols() - 1)]].max(0.0);
@@ -601,7 +600,7 @@ fn merl_tables_hold_the_models_values_at_the_middle_of_every_cell() {
 #[test]
 fn what_cannot_be_exported_is_an_error_of_its_own() {
     let samples = samples(7);
-    let pairs = pairs(&samples.directions);
+    let pairs = &samples.directions;
     let model = |network: ElmParams<f64>| {
         let params = BrdfParams {
             features: Features::Cosines,

@@ -17,7 +17,7 @@ fn samples(path: &Path, material: usize, first: usize, step: usize) {
     let data = synthetic::measurements(1, &[MaterialId::new(material).unwrap()], Invalid::Clamp);
     let mut text = String::from("theta_i,phi_i,theta_o,phi_o,red,green\n");
     for row in (first..205).step_by(step) {
-        let d = &data.directions[row];
+        let d = elm_datasets::Angles::of(&data.directions[row]);
         for angle in [d.theta_i, d.phi_i, d.theta_o, d.phi_o] {
             write!(text, "{},", angle.to_degrees()).unwrap();
         }

@@ -9,7 +9,6 @@ use elm_brdf::gallery::{self, Exhibit, Only, sphere};
 use elm_brdf::model::BrdfModel;
 use elm_brdf::recipes;
 use elm_brdf::render::{Bitmap, Options, render};
-use elm_datasets::geometry::pairs;
 use elm_datasets::{Invalid, MaterialId, synthetic};
 
 /// Pixels across and down of what the page shows to this test.
@@ -23,7 +22,7 @@ fn exhibits() -> Vec<Exhibit> {
             let data = synthetic::measurements(1, &[id], Invalid::Clamp);
             let samples = data.samples(0).unwrap();
             let brdf = recipes::network(None)
-                .fit(&pairs(&samples.directions), samples.values.view())
+                .fit(&samples.directions, samples.values.view())
                 .unwrap();
             Exhibit {
                 name: format!("</script> {id} & \"quoted\""),

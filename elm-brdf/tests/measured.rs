@@ -153,12 +153,12 @@ fn channels_are_matched_by_name_and_wavelength_by_every_command() {
         let table = format!("{name}.binary");
         bench.run(&["export", &model, "-o", &table]);
         let merl = elm_datasets::merl::Merl::read(bench.path(&table)).unwrap();
-        let [r, g, b] = merl.at(&elm_datasets::Directions {
+        let [r, g, b] = merl.at(&elm_datasets::DirectionPair::from(elm_datasets::Angles {
             theta_i: 0.3,
             phi_i: 0.0,
             theta_o: 0.5,
             phi_o: 2.0,
-        });
+        }));
         assert!(r > g && g > b, "{name}: {r} {g} {b}");
     }
     // C has the same weights in the same order whatever the file's.

@@ -17,10 +17,10 @@ use elm_brdf::link::Link;
 use elm_brdf::metrics::{Metric, Metrics};
 use elm_brdf::model::{BrdfModel, BrdfParams, Tuned};
 use elm_datasets::Brdf;
-use elm_datasets::geometry::{self, Pair, cartesian};
+use elm_datasets::geometry::{DirectionPair, cartesian};
 
 /// Directions of every kind: anywhere above the surface, grazing, coincident, mirrored.
-fn directions(count: usize, seed: u64) -> Vec<Pair> {
+fn directions(count: usize, seed: u64) -> Vec<DirectionPair> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     (0..count)
         .map(|kind| {
@@ -31,7 +31,7 @@ fn directions(count: usize, seed: u64) -> Vec<Pair> {
             let (theta_i, theta_o) = (theta(), theta());
             let phi = random.random_range(-PI..PI);
             let incident = cartesian(theta_i, phi);
-            Pair {
+            DirectionPair {
                 incident,
                 outgoing: match kind % 5 {
                     0 => incident,
@@ -43,11 +43,11 @@ fn directions(count: usize, seed: u64) -> Vec<Pair> {
         .collect()
 }
 
-fn measured(material: usize) -> (Vec<Pair>, Array2<f64>) {
+fn measured(material: usize) -> (Vec<DirectionPair>, Array2<f64>) {
     let id = MaterialId::new(material).unwrap();
     let data = synthetic::measurements(1, &[id], Invalid::Clamp);
     let samples = data.samples(0).unwrap();
-    (geometry::pairs(&samples.directions), samples.values)
+    (samples.directions, samples.values)
 }
 
 fn tuned(features: Option<Features>) -> Tuned {
@@ -64,7 +64,7 @@ fn values_are_finite_and_not_negative_for_every_pair_of_directions() {
     let few = tuned(None).fit_model(&pairs, values.view()).unwrap();
     let paint = paint::samples(3200, 1).unwrap();
     let many = tuned(None)
-        .fit_model(&geometry::pairs(&paint.directions), paint.values.view())
+        .fit_model(&paint.directions, paint.values.view())
         .unwrap();
     for model in [few, many] {
         let values = model.eval(&directions(20_000, 3)).unwrap();
@@ -92,7 +92,7 @@ fn a_million_values_of_each_rgl_material_are_finite_and_not_negative() {
             max_floats: Some(675),
             ..Tuned::default()
         };
-        let pairs = geometry::pairs(&samples.directions);
+        let pairs = &samples.directions;
         let model = tuned.fit_model(&pairs, samples.values.view()).unwrap();
         assert!(model.stored_floats() <= 675);
         let values = model.eval(&everywhere).unwrap();
@@ -115,9 +115,9 @@ fn a_metallic_paint_from_one_in_a_hundred_thousand_to_six_hundred_is_met_over_it
         ..Tuned::default()
     };
     let model = tuned
-        .fit_model(&geometry::pairs(&train.directions), train.values.view())
+        .fit_model(&train.directions, train.values.view())
         .unwrap();
-    let pairs = geometry::pairs(&test.directions);
+    let pairs = &test.directions;
     let predicted = model.eval(&pairs).unwrap();
     let ceiling = Link::HEADROOM * train.values.iter().copied().fold(0.0, f64::max);
     assert!(predicted.iter().all(|&v| (0.0..=ceiling).contains(&v)));
@@ -137,7 +137,7 @@ fn a_model_of_reciprocal_inputs_is_reciprocal_to_the_last_bit() {
     for set in Features::ALL.into_iter().filter(|set| set.is_reciprocal()) {
         let model = tuned(Some(set)).fit_model(&pairs, values.view()).unwrap();
         let there = directions(500, 5);
-        let back: Vec<Pair> = there.iter().map(|pair| pair.swapped()).collect();
+        let back: Vec<DirectionPair> = there.iter().map(|pair| pair.swapped()).collect();
         assert_eq!(
             model.eval(&there).unwrap(),
             model.eval(&back).unwrap(),
@@ -152,7 +152,7 @@ fn below_either_horizon_a_model_is_black() {
     let model = tuned(None).fit_model(&pairs, values.view()).unwrap();
     let (above, below) = (cartesian(0.4, 0.0), cartesian(2.0, 1.0));
     for (incident, outgoing) in [(above, below), (below, above), (below, below)] {
-        let value = model.eval(&[Pair { incident, outgoing }]).unwrap();
+        let value = model.eval(&[DirectionPair { incident, outgoing }]).unwrap();
         assert!(value.iter().all(|&v| v == 0.0));
     }
 }
@@ -175,7 +175,7 @@ fn kinds() -> Vec<BrdfModel> {
             .fit_model(&pairs, values.view())
             .unwrap(),
         tuned(Some(Features::Highlight))
-            .fit_model(&geometry::pairs(&paint.directions), paint.values.view())
+            .fit_model(&paint.directions, paint.values.view())
             .unwrap(),
         params(plain.clone())
             .fit_model(&pairs, values.view())
@@ -244,7 +244,7 @@ fn stored_numbers_are_those_that_the_file_holds() {
 fn no_more_numbers_are_stored_than_allowed() {
     let (pairs, values) = measured(3);
     let paint = paint::samples(3200, 1).unwrap();
-    let many = geometry::pairs(&paint.directions);
+    let many = &paint.directions;
     for most in [40, 100, 675] {
         let tuned = Tuned {
             max_floats: Some(most),

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use elm_brdf::metrics::Metrics;
 use elm_brdf::reference::Nbrdf;
 use elm_datasets::Brdf;
-use elm_datasets::geometry::{Pair, cartesian, pairs};
+use elm_datasets::geometry::{DirectionPair, cartesian};
 use elm_datasets::{OpenOptions, open};
 
 fn shared() -> Option<PathBuf> {
@@ -39,7 +39,7 @@ fn the_published_networks_have_the_errors_that_are_printed_for_them() {
         let network = Nbrdf::read(&dir.join(format!("nbrdf/{material}_rgb.f32"))).unwrap();
         let file = dir.join(format!("rgl/{material}_rgb_test.csv"));
         let samples = open(&file, &OpenOptions::default()).unwrap().samples;
-        let pairs = pairs(&samples.directions);
+        let pairs = &samples.directions;
         let predicted = network.eval(&pairs).unwrap();
         let metrics = Metrics::of(&pairs, predicted.view(), samples.values.view()).unwrap();
         println!("{material}: {:.6}", metrics.log_cosine_mae);
@@ -53,7 +53,7 @@ fn the_published_networks_have_the_errors_that_are_printed_for_them() {
 }
 
 /// The formulas as the format's description has them, with angles, in `f64`.
-fn by_angles(w: &[f32], pair: &Pair) -> [f64; 3] {
+fn by_angles(w: &[f32], pair: &DirectionPair) -> [f64; 3] {
     let (i, o) = (pair.incident, pair.outgoing);
     let sum: Vec<f64> = (0..3).map(|k| i[k] + o[k]).collect();
     let theta = sum[0].hypot(sum[1]).atan2(sum[2]);
@@ -91,10 +91,10 @@ fn a_network_without_angles_is_the_network_with_angles() {
         .map(|k| ((k as f32 * 12.9898).sin() * 43758.547).fract() * 0.6)
         .collect();
     let network = Nbrdf::new(&weights).unwrap();
-    let mut directions: Vec<Pair> = (0..300)
+    let mut directions: Vec<DirectionPair> = (0..300)
         .map(|k| {
             let k = f64::from(k);
-            Pair {
+            DirectionPair {
                 incident: cartesian((0.37 * k) % 1.5, (0.9 * k) % 6.2),
                 outgoing: cartesian((0.73 * k) % 1.5, (1.7 * k) % 6.2),
             }
@@ -102,7 +102,7 @@ fn a_network_without_angles_is_the_network_with_angles() {
         .collect();
     // No azimuth of the half vector.
     let up = cartesian(0.0, 0.0);
-    directions.push(Pair {
+    directions.push(DirectionPair {
         incident: up,
         outgoing: up,
     });
@@ -118,7 +118,7 @@ fn a_network_without_angles_is_the_network_with_angles() {
             );
         }
     }
-    let below = Pair {
+    let below = DirectionPair {
         incident: [0.0, 0.6, -0.8],
         outgoing: up,
     };

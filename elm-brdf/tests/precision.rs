@@ -11,7 +11,7 @@ use elm_brdf::link::Link;
 use elm_brdf::metrics::Metrics;
 use elm_brdf::model::{BrdfModel, BrdfParams};
 use elm_datasets::Brdf;
-use elm_datasets::geometry::{Pair, cartesian, pairs};
+use elm_datasets::geometry::{DirectionPair, cartesian};
 use elm_datasets::{Invalid, MaterialId, synthetic};
 use ndarray::array;
 
@@ -29,7 +29,7 @@ fn model(lambda: f64) -> BrdfModel {
             .solver(Ridge::relative(lambda)),
     };
     params
-        .fit_model(&pairs(&samples.directions), samples.values.view())
+        .fit_model(&samples.directions, samples.values.view())
         .unwrap()
 }
 
@@ -40,7 +40,7 @@ fn measured(model: &BrdfModel) -> f64 {
     for theta_i in 0..15 {
         for theta_o in 0..15 {
             for phi in 0..12 {
-                grid.push(Pair {
+                grid.push(DirectionPair {
                     incident: cartesian(f64::from(theta_i) * 0.1, 0.0),
                     outgoing: cartesian(f64::from(theta_o) * 0.1, f64::from(phi) * 0.3),
                 });
@@ -71,7 +71,7 @@ fn the_error_of_single_precision_is_foretold_and_not_far_too_large() {
 
 /// The model with so many times its error of single precision for a held-out RMSE.
 fn with_held_out(model: &BrdfModel, times: f64) -> BrdfModel {
-    let pairs = [Pair {
+    let pairs = [DirectionPair {
         incident: cartesian(0.3, 0.0),
         outgoing: cartesian(0.5, 1.0),
     }];

@@ -7,12 +7,12 @@ use elm_brdf::metrics::Metrics;
 use elm_brdf::model::Tuned;
 use elm_brdf::prior::{Prior, PriorParams};
 use elm_datasets::Brdf;
-use elm_datasets::geometry::{self, Pair};
+use elm_datasets::geometry::DirectionPair;
 use elm_datasets::{Invalid, MaterialId, synthetic};
 use ndarray::{Array2, Axis, concatenate, s};
 
 /// The first channel of these of the stand-in's materials, side by side.
-fn materials(numbers: impl Iterator<Item = usize>) -> (Vec<Pair>, Array2<f64>) {
+fn materials(numbers: impl Iterator<Item = usize>) -> (Vec<DirectionPair>, Array2<f64>) {
     let ids: Vec<MaterialId> = numbers.map(|n| MaterialId::new(n).unwrap()).collect();
     let data = synthetic::measurements(1, &ids, Invalid::Clamp);
     let columns: Vec<_> = data
@@ -21,7 +21,7 @@ fn materials(numbers: impl Iterator<Item = usize>) -> (Vec<Pair>, Array2<f64>) {
         .map(|m| m.values.slice(s![.., ..1]))
         .collect();
     let values = concatenate(Axis(1), &columns).unwrap();
-    (geometry::pairs(&data.directions), values)
+    (data.directions, values)
 }
 
 fn small() -> PriorParams {
@@ -31,7 +31,7 @@ fn small() -> PriorParams {
     }
 }
 
-fn rmse(model: &dyn Brdf, pairs: &[Pair], truth: &Array2<f64>) -> f64 {
+fn rmse(model: &dyn Brdf, pairs: &[DirectionPair], truth: &Array2<f64>) -> f64 {
     let predicted = model.eval(pairs).unwrap();
     Metrics::of(pairs, predicted.view(), truth.view())
         .unwrap()
@@ -47,7 +47,7 @@ fn with_a_prior_few_measurements_do_better_than_without() {
         let truth = values.slice(s![.., material..=material]).to_owned();
         let prior = prior.without(&[material]).unwrap();
         let rows: Vec<usize> = (3..205).step_by(9).collect();
-        let at: Vec<Pair> = rows.iter().map(|&row| pairs[row]).collect();
+        let at: Vec<DirectionPair> = rows.iter().map(|&row| pairs[row]).collect();
         let few = truth.select(Axis(0), &rows);
         let taught = prior.fit_model(&at, few.view()).unwrap();
         let alone = Tuned::default().fit_model(&at, few.view()).unwrap();

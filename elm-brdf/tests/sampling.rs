@@ -14,7 +14,7 @@ use std::sync::LazyLock;
 use elm_brdf::render::{Material, MaterialLoader, Options, Savings, render};
 use elm_brdf::scene_materials::{Library, MaterialTable, Scene};
 use elm_datasets::curet::MATERIALS;
-use elm_datasets::geometry::{Pair, cartesian};
+use elm_datasets::geometry::{DirectionPair, cartesian};
 use networks::library;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -130,7 +130,7 @@ fn furnace(material: &Material, theta_o: f64, random: &mut ChaCha8Rng) -> (f64, 
     const THETAS: usize = 90;
     const PHIS: usize = 36;
     let outgoing = cartesian(theta_o, 0.0);
-    let luminance = |pairs: &[Pair]| -> Vec<f64> {
+    let luminance = |pairs: &[DirectionPair]| -> Vec<f64> {
         let values = material.eval(pairs).unwrap();
         let luminance = |f: &[f64; 3]| 0.2126 * f[0] + 0.7152 * f[1] + 0.0722 * f[2];
         values.iter().map(luminance).collect()
@@ -142,7 +142,7 @@ fn furnace(material: &Material, theta_o: f64, random: &mut ChaCha8Rng) -> (f64, 
         let theta = (i as f64 + 0.5) * step;
         for j in 0..PHIS {
             let incident = cartesian(theta, (j as f64 + 0.5) / PHIS as f64 * PI);
-            pairs.push(Pair { incident, outgoing });
+            pairs.push(DirectionPair { incident, outgoing });
             areas.push(theta.sin() * theta.cos() * step * TAU / PHIS as f64);
         }
     }
@@ -152,11 +152,11 @@ fn furnace(material: &Material, theta_o: f64, random: &mut ChaCha8Rng) -> (f64, 
         .zip(areas)
         .map(|(value, area)| value * area)
         .sum();
-    let (pairs, factors): (Vec<Pair>, Vec<f64>) = (0..DRAWS)
+    let (pairs, factors): (Vec<DirectionPair>, Vec<f64>) = (0..DRAWS)
         .map(|_| {
             let drawn = material.sample(outgoing, [random.random(), random.random()]);
             let (incident, density) = drawn;
-            (Pair { incident, outgoing }, incident[2] / density)
+            (DirectionPair { incident, outgoing }, incident[2] / density)
         })
         .unzip();
     let weights: Vec<f64> = luminance(&pairs)

@@ -16,7 +16,7 @@ use elm_brdf::batch::Packed;
 use elm_brdf::metrics::Metric;
 use elm_brdf::model::{BrdfModel, Tuned};
 use elm_datasets::Brdf;
-use elm_datasets::geometry::{Pair, cartesian};
+use elm_datasets::geometry::{DirectionPair, cartesian};
 
 type Formula = fn(&Cosines) -> f64;
 
@@ -34,18 +34,18 @@ fn retroreflector(angles: &Cosines) -> f64 {
     0.1 / PI + 40.0 * angles.lafortune(PI / 4.0, 250.0)
 }
 
-fn value(formula: Formula, pair: &Pair) -> f64 {
+fn value(formula: Formula, pair: &DirectionPair) -> f64 {
     Cosines::of_vectors(pair.incident, pair.outgoing).map_or(0.0, |angles| formula(&angles))
 }
 
 /// Light to 60 degrees in steps of 15, viewer to 80 in steps of 8, azimuths in steps of 18.
-fn grid() -> Vec<Pair> {
+fn grid() -> Vec<DirectionPair> {
     let mut pairs = Vec::new();
     for light in (0..=60_u32).step_by(15) {
         for viewer in (0..=80_u32).step_by(8) {
             for azimuth in (0..=180_u32).step_by(18) {
                 let radians = |degrees: u32| f64::from(degrees).to_radians();
-                pairs.push(Pair {
+                pairs.push(DirectionPair {
                     incident: cartesian(radians(light), 0.0),
                     outgoing: cartesian(radians(viewer), radians(azimuth)),
                 });
@@ -55,7 +55,7 @@ fn grid() -> Vec<Pair> {
     pairs
 }
 
-fn scattered(count: usize, most: f64, seed: u64) -> Vec<Pair> {
+fn scattered(count: usize, most: f64, seed: u64) -> Vec<DirectionPair> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut direction = |phi: f64| {
         // Even over the hemisphere.
@@ -63,7 +63,7 @@ fn scattered(count: usize, most: f64, seed: u64) -> Vec<Pair> {
         cartesian(cosine.acos(), random.random_range(0.0..2.0 * PI) + phi)
     };
     (0..count)
-        .map(|_| Pair {
+        .map(|_| DirectionPair {
             incident: direction(0.0),
             outgoing: direction(0.3),
         })
@@ -71,7 +71,7 @@ fn scattered(count: usize, most: f64, seed: u64) -> Vec<Pair> {
 }
 
 /// Values with relative noise; the sum of twelve uniform deviates less 6 is near to normal.
-fn measured(formula: Formula, pairs: &[Pair], noise: f64) -> Array2<f64> {
+fn measured(formula: Formula, pairs: &[DirectionPair], noise: f64) -> Array2<f64> {
     let mut random = ChaCha8Rng::seed_from_u64(77);
     let mut normal = || (0..12).map(|_| random.random_range(0.0..1.0)).sum::<f64>() - 6.0;
     Array2::from_shape_fn((pairs.len(), 1), |(row, _)| {
@@ -79,7 +79,7 @@ fn measured(formula: Formula, pairs: &[Pair], noise: f64) -> Array2<f64> {
     })
 }
 
-fn fit(pairs: &[Pair], values: &Array2<f64>, seed: u64) -> BrdfModel {
+fn fit(pairs: &[DirectionPair], values: &Array2<f64>, seed: u64) -> BrdfModel {
     let tuned = Tuned {
         seed,
         ..Tuned::default()
@@ -87,7 +87,7 @@ fn fit(pairs: &[Pair], values: &Array2<f64>, seed: u64) -> BrdfModel {
     tuned.fit_model(pairs, values.view()).unwrap()
 }
 
-fn rmse(model: &dyn Brdf, formula: Formula, pairs: &[Pair]) -> f64 {
+fn rmse(model: &dyn Brdf, formula: Formula, pairs: &[DirectionPair]) -> f64 {
     let fitted = model.eval(pairs).unwrap();
     let squares = pairs.iter().zip(fitted.rows());
     let sum: f64 = squares
@@ -96,7 +96,7 @@ fn rmse(model: &dyn Brdf, formula: Formula, pairs: &[Pair]) -> f64 {
     (sum / pairs.len() as f64).sqrt()
 }
 
-fn root_mean_square(formula: Formula, pairs: &[Pair]) -> f64 {
+fn root_mean_square(formula: Formula, pairs: &[DirectionPair]) -> f64 {
     let sum: f64 = pairs.iter().map(|pair| value(formula, pair).powi(2)).sum();
     (sum / pairs.len() as f64).sqrt()
 }
@@ -129,7 +129,7 @@ fn a_retroreflector_is_met_with_several_seeds() {
         let mut near = |c: f64| c + random.random_range(-0.15..0.15);
         let moved = [near(x), near(y), near(z).max(0.05)];
         let length = moved.iter().map(|c| c * c).sum::<f64>().sqrt();
-        pairs.push(Pair {
+        pairs.push(DirectionPair {
             incident: [x, y, z],
             outgoing: moved.map(|c| c / length),
         });
@@ -191,8 +191,8 @@ fn a_coating_as_dark_as_its_noise_keeps_its_albedo() {
 
 #[test]
 fn one_curve_is_smooth_off_its_plane() {
-    let pairs: Vec<Pair> = (0..90)
-        .map(|degrees| Pair {
+    let pairs: Vec<DirectionPair> = (0..90)
+        .map(|degrees| DirectionPair {
             incident: cartesian(f64::from(degrees).to_radians(), 0.0),
             outgoing: cartesian(20_f64.to_radians(), PI),
         })
@@ -201,8 +201,8 @@ fn one_curve_is_smooth_off_its_plane() {
     let most = values.iter().copied().fold(0.0, f64::max);
     let model = fit(&pairs, &values, 1);
     for light in [20.0_f64, 50.0, 70.0] {
-        let around: Vec<Pair> = (0..=180)
-            .map(|azimuth| Pair {
+        let around: Vec<DirectionPair> = (0..=180)
+            .map(|azimuth| DirectionPair {
                 incident: cartesian(light.to_radians(), 0.0),
                 outgoing: cartesian(20_f64.to_radians(), f64::from(azimuth).to_radians()),
             })

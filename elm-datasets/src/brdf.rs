@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use ndarray::{Array2, ArrayViewMut2};
 
-use crate::geometry::Pair;
+use crate::geometry::DirectionPair;
 
 /// Why a value could not be computed: an error of whatever crate the [`Brdf`] is of.
 #[derive(Debug)]
@@ -51,11 +51,11 @@ impl From<ArgumentError> for EvalError {
 /// The value of one pair does not depend on the other pairs of a batch, bit for bit.
 ///
 /// ```
-/// use elm_datasets::geometry::{Pair, cartesian};
+/// use elm_datasets::geometry::{DirectionPair, cartesian};
 /// use elm_datasets::{Brdf, lobes::Formula};
 ///
 /// let paint = Formula::lambert(0.5)?;
-/// let pair = Pair { incident: cartesian(0.3, 0.0), outgoing: cartesian(0.8, 2.0) };
+/// let pair = DirectionPair { incident: cartesian(0.3, 0.0), outgoing: cartesian(0.8, 2.0) };
 /// let values = paint.eval(&[pair])?;
 /// assert_eq!(values.dim(), (1, 1));
 /// assert!((values[[0, 0]] - 0.5 / std::f64::consts::PI).abs() < 1e-15);
@@ -71,13 +71,17 @@ pub trait Brdf: Any + Send + Sync {
     /// # Errors
     /// Where a value cannot be computed, such as for a direction that is not finite, and where
     /// `values` has another shape.
-    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError>;
+    fn eval_into(
+        &self,
+        pairs: &[DirectionPair],
+        values: ArrayViewMut2<'_, f64>,
+    ) -> Result<(), EvalError>;
 
     /// As [`eval_into`](Self::eval_into), into an array of its own.
     ///
     /// # Errors
     /// Those of [`eval_into`](Self::eval_into).
-    fn eval(&self, pairs: &[Pair]) -> Result<Array2<f64>, EvalError> {
+    fn eval(&self, pairs: &[DirectionPair]) -> Result<Array2<f64>, EvalError> {
         let mut values = Array2::zeros((pairs.len(), self.channels()));
         self.eval_into(pairs, values.view_mut())?;
         Ok(values)
@@ -89,7 +93,11 @@ impl<B: Brdf + ?Sized> Brdf for Box<B> {
         (**self).channels()
     }
 
-    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+    fn eval_into(
+        &self,
+        pairs: &[DirectionPair],
+        values: ArrayViewMut2<'_, f64>,
+    ) -> Result<(), EvalError> {
         (**self).eval_into(pairs, values)
     }
 }
@@ -99,7 +107,11 @@ impl<B: Brdf + ?Sized> Brdf for Arc<B> {
         (**self).channels()
     }
 
-    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+    fn eval_into(
+        &self,
+        pairs: &[DirectionPair],
+        values: ArrayViewMut2<'_, f64>,
+    ) -> Result<(), EvalError> {
         (**self).eval_into(pairs, values)
     }
 }
@@ -110,7 +122,7 @@ impl<B: Brdf + ?Sized> Brdf for Arc<B> {
 /// # Errors
 /// [`ArgumentError`] at the first fault.
 pub fn check_arguments(
-    pairs: &[Pair],
+    pairs: &[DirectionPair],
     values: &ArrayViewMut2<'_, f64>,
     channels: usize,
 ) -> Result<(), ArgumentError> {
@@ -125,7 +137,7 @@ pub fn check_arguments(
 ///
 /// # Errors
 /// [`ArgumentError::NotFinite`] at the first that is not.
-pub fn check_directions(pairs: &[Pair]) -> Result<(), ArgumentError> {
+pub fn check_directions(pairs: &[DirectionPair]) -> Result<(), ArgumentError> {
     for (row, pair) in pairs.iter().enumerate() {
         let mut components = pair.incident.iter().chain(&pair.outgoing);
         if let Some(column) = components.position(|c| !c.is_finite()) {

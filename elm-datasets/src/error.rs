@@ -190,7 +190,7 @@ pub enum Error {
         path: PathBuf,
         /// Line, counted from 1.
         line: usize,
-        /// Name of the angle, as in [`Directions`](crate::Directions).
+        /// Name of the angle, as in [`Angles`](crate::Angles).
         angle: &'static str,
         /// The value found, in radians.
         value: f64,

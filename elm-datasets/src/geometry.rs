@@ -1,6 +1,6 @@
 //! Directions as vectors. The surface lies in the plane $z = 0$ with its normal along $+z$.
 
-use crate::samples::Directions;
+use std::f64::consts::PI;
 
 /// A vector in the frame of the surface.
 pub type Vector = [f64; 3];
@@ -57,14 +57,14 @@ pub fn half_vector(l: Vector, v: Vector) -> Option<Vector> {
 /// A pair of unit vectors in the frame of the surface: where light comes from and where it goes,
 /// both pointing away from the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pair {
+pub struct DirectionPair {
     /// $\omega_i$, towards the light; the paper's $L$.
     pub incident: Vector,
     /// $\omega_o$, towards the viewer; the paper's $V$, at its angles $(\theta_e, \varphi_e)$.
     pub outgoing: Vector,
 }
 
-impl Pair {
+impl DirectionPair {
     /// The pair with light and viewer exchanged.
     #[must_use]
     pub fn swapped(self) -> Self {
@@ -78,6 +78,22 @@ impl Pair {
     #[must_use]
     pub fn is_above_horizon(&self) -> bool {
         self.incident[2] > 0.0 && self.outgoing[2] > 0.0
+    }
+
+    /// Cosine of the angle between the light and the viewer, in \[-1, 1\].
+    #[must_use]
+    pub fn cos_between(&self) -> f64 {
+        dot(self.incident, self.outgoing).clamp(-1.0, 1.0)
+    }
+
+    /// The pair as a file of angles gives it: unit vectors again, and the rounding of angles.
+    #[must_use]
+    pub(crate) fn through_angles(self) -> Self {
+        let [incident, outgoing] = [self.incident, self.outgoing].map(|vector| {
+            let (theta, phi) = polar(vector);
+            cartesian(theta, phi)
+        });
+        Self { incident, outgoing }
     }
 
     /// The half and difference angles.
@@ -106,8 +122,8 @@ impl Pair {
 /// $\theta_h$ is taken as 0.
 ///
 /// ```
-/// use elm_datasets::geometry::{Pair, cartesian};
-/// let pair = Pair { incident: cartesian(0.2, 0.0), outgoing: cartesian(1.0, 0.0) };
+/// use elm_datasets::geometry::{DirectionPair, cartesian};
+/// let pair = DirectionPair { incident: cartesian(0.2, 0.0), outgoing: cartesian(1.0, 0.0) };
 /// let angles = pair.half_difference();
 /// assert!((angles.theta_h() - 0.6).abs() < 1e-15);
 /// assert!((angles.theta_d() - 0.4).abs() < 1e-15);
@@ -164,19 +180,36 @@ impl HalfDifference {
     }
 }
 
-impl From<&Directions> for Pair {
-    /// Equation 12 for both directions.
-    fn from(directions: &Directions) -> Self {
-        Self {
-            incident: cartesian(directions.theta_i, directions.phi_i),
-            outgoing: cartesian(directions.theta_o, directions.phi_o),
-        }
-    }
+/// A pair of directions as files have them: polar angles in radians. `theta` is measured from the
+/// surface normal, `phi` around it; `i` is the light, `o` the viewer.
+///
+/// ```
+/// use elm_datasets::geometry::{Angles, DirectionPair};
+/// use std::f64::consts::PI;
+///
+/// let mirror = DirectionPair::from(Angles { theta_i: 0.5, phi_i: 0.0, theta_o: 0.5, phi_o: PI });
+/// assert!((mirror.cos_between() - 1.0_f64.cos()).abs() < 1e-15);
+/// assert_eq!(Angles::of(&mirror).phi_o, PI);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Angles {
+    /// Angle between the normal and the light.
+    pub theta_i: f64,
+    /// Azimuth of the light.
+    pub phi_i: f64,
+    /// Angle between the normal and the viewer.
+    pub theta_o: f64,
+    /// Azimuth of the viewer.
+    pub phi_o: f64,
 }
 
-impl From<&Pair> for Directions {
-    fn from(pair: &Pair) -> Self {
-        let ((theta_i, phi_i), (theta_o, phi_o)) = (polar(pair.incident), polar(pair.outgoing));
+impl Angles {
+    /// The angles of a pair, azimuths from -pi to pi: those that give the same vectors, bit for bit,
+    /// where any angles do, and among them those with at most 15 digits. So a file that is read and
+    /// written again keeps its numbers.
+    #[must_use]
+    pub fn of(pair: &DirectionPair) -> Self {
+        let [(theta_i, phi_i), (theta_o, phi_o)] = [pair.incident, pair.outgoing].map(exact_polar);
         Self {
             theta_i,
             phi_i,
@@ -184,12 +217,42 @@ impl From<&Pair> for Directions {
             phi_o,
         }
     }
+
+    /// The two polar angles and azimuths in the order of their names.
+    pub(crate) fn to_array(self) -> [f64; 4] {
+        [self.theta_i, self.phi_i, self.theta_o, self.phi_o]
+    }
 }
 
-/// Every pair of directions as vectors.
-#[must_use]
-pub fn pairs(directions: &[Directions]) -> Vec<Pair> {
-    directions.iter().map(Pair::from).collect()
+impl From<Angles> for DirectionPair {
+    /// Equation 12 for both directions.
+    fn from(angles: Angles) -> Self {
+        Self {
+            incident: cartesian(angles.theta_i, angles.phi_i),
+            outgoing: cartesian(angles.theta_o, angles.phi_o),
+        }
+    }
+}
+
+/// As [`polar`], but of the angles near those computed such that [`cartesian`] gives the same bits,
+/// where there are any.
+fn exact_polar(vector: Vector) -> (f64, f64) {
+    let (theta, phi) = polar(vector);
+    let azimuths = || nearby(phi).filter(|phi| phi.abs() <= PI);
+    let polar_angles = nearby(theta).filter(|theta| theta.cos() == vector[2]);
+    polar_angles
+        .flat_map(|theta| azimuths().map(move |phi| (theta, phi)))
+        .find(|&(theta, phi)| cartesian(theta, phi) == vector)
+        .unwrap_or((theta, phi))
+}
+
+/// A number to 15 digits, itself, and the five above and below.
+fn nearby(number: f64) -> impl Iterator<Item = f64> {
+    let rounded = format!("{number:.14e}").parse().ok();
+    let above = std::iter::successors(Some(number), |number| Some(number.next_up()));
+    let below = std::iter::successors(Some(number), |number| Some(number.next_down()));
+    let both = above.zip(below).take(6).flat_map(|(a, b)| [a, b]);
+    rounded.into_iter().chain(both)
 }
 
 #[cfg(test)]
@@ -197,7 +260,7 @@ mod tests {
     use super::*;
     use approx::{assert_abs_diff_eq, assert_relative_eq};
     use proptest::prelude::*;
-    use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_3, FRAC_PI_4, PI};
+    use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_3, FRAC_PI_4};
 
     #[test]
     fn equation_12_at_hand_computed_angles() {
@@ -233,7 +296,7 @@ mod tests {
     fn half_and_difference_angles_keep_their_digits_near_coincidence() {
         // In one plane theta_h is the mean of the two angles and theta_d half their difference;
         // an arc cosine would return 0 for both.
-        let pair = Pair {
+        let pair = DirectionPair {
             incident: cartesian(3e-9, 0.0),
             outgoing: cartesian(1e-9, 0.0),
         };
@@ -247,7 +310,7 @@ mod tests {
         // Light and viewer at the horizon on opposite sides: the half vector is the normal where
         // it exists. The heights are exact, the rounding of the horizontal parts cancels.
         for height in [1e-3, 1e-9, 1e-300, 0.0] {
-            let pair = Pair {
+            let pair = DirectionPair {
                 incident: [1.0, 0.0, height],
                 outgoing: [-1.0, 0.0, height],
             };
@@ -259,13 +322,49 @@ mod tests {
         }
     }
 
+    #[test]
+    fn opposite_azimuths_add_the_polar_angles_and_equal_ones_subtract_them() {
+        let between = |phi_o| {
+            let pair = DirectionPair {
+                incident: cartesian(0.3, 0.0),
+                outgoing: cartesian(FRAC_PI_4, phi_o),
+            };
+            assert_eq!(pair.swapped().swapped(), pair);
+            assert_eq!(pair.swapped().cos_between(), pair.cos_between());
+            pair.cos_between().acos()
+        };
+        assert_relative_eq!(between(PI), FRAC_PI_4 + 0.3, epsilon = 1e-14);
+        assert_relative_eq!(between(0.0), FRAC_PI_4 - 0.3, epsilon = 1e-14);
+    }
+
+    #[test]
+    fn angles_with_few_digits_come_back_as_they_were() {
+        for thousandths in 1..1570 {
+            let theta = f64::from(thousandths) / 1000.0;
+            for phi in [-3.141_592, -2.0, -0.1, 0.0, 0.7, 1.5, 3.0] {
+                assert_eq!(exact_polar(cartesian(theta, phi)), (theta, phi));
+            }
+        }
+        assert_eq!(exact_polar(NORMAL), (0.0, 0.0));
+        assert_eq!(exact_polar([1.0, 0.0, 0.0]), (FRAC_PI_2, 0.0));
+    }
+
     proptest! {
+        #[test]
+        fn angles_give_the_vectors_that_they_were_taken_from_bit_for_bit(
+            theta in 0.0..=FRAC_PI_2, phi in -PI..=PI,
+        ) {
+            let vector = cartesian(theta, phi);
+            let (theta, phi) = exact_polar(vector);
+            prop_assert_eq!(cartesian(theta, phi), vector);
+        }
+
         #[test]
         fn half_and_difference_angles_are_those_of_the_vectors_and_reciprocal(
             theta_i in 0.0..FRAC_PI_2, phi_i in -PI..PI,
             theta_o in 0.0..FRAC_PI_2, phi_o in -PI..PI,
         ) {
-            let pair = Pair {
+            let pair = DirectionPair {
                 incident: cartesian(theta_i, phi_i),
                 outgoing: cartesian(theta_o, phi_o),
             };

@@ -9,8 +9,8 @@
 //!   ([`scattered`]), the [`merl`] and [`rgl`] databases, and [`pbrt`]-v2.
 //! - [`csv`] reads tables of one's own; [`toy`] makes regression problems with known answers.
 //!
-//! Directions are polar angles in radians in the frame of the surface, values are BRDF in 1/sr
-//! without the cosine. Nothing here panics on bad input: every failure is an [`Error`] that names
+//! Directions are unit vectors in the frame of the surface, which readers make of a file's angles
+//! and writers turn into [`Angles`]; values are BRDF in 1/sr without the cosine. Nothing here panics on bad input: every failure is an [`Error`] that names
 //! the file, the line and what was expected there.
 //!
 //! ```
@@ -59,8 +59,9 @@ pub mod toy;
 
 pub use brdf::Brdf;
 pub use error::Error;
+pub use geometry::{Angles, DirectionPair};
 pub use material_id::MaterialId;
 pub use measurements::{Invalid, Material, Measurements, Origin, fill_values};
 pub use open::{Format, OpenOptions, Opened, open};
-pub use samples::{Directions, Samples};
+pub use samples::Samples;
 pub use sampling::Sampling;

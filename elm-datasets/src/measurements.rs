@@ -6,9 +6,10 @@ use std::str::FromStr;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
+use crate::geometry::DirectionPair;
 use crate::material_id::MaterialId;
 use crate::text::shorten;
-use crate::{Directions, Error, Samples};
+use crate::{Error, Samples};
 
 /// What to do with negative reflectance, which noise gives and physics does not.
 ///
@@ -171,7 +172,7 @@ pub struct Measurements {
     /// Where the numbers come from.
     pub origin: Origin,
     /// The pairs of directions in the order of the measurements, 205 of them.
-    pub directions: Vec<Directions>,
+    pub directions: Vec<DirectionPair>,
     /// Name of each column of a material's values.
     pub channels: Vec<String>,
     /// The materials, in the order asked for.
@@ -213,7 +214,7 @@ impl Material {
 impl Measurements {
     pub(crate) fn new(
         origin: Origin,
-        directions: Vec<Directions>,
+        directions: Vec<DirectionPair>,
         channels: &[&str],
         materials: Vec<Material>,
     ) -> Self {

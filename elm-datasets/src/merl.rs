@@ -32,8 +32,8 @@ use ndarray::{Array2, ArrayViewMut2};
 use crate::brdf::{Brdf, EvalError, check_arguments};
 pub use crate::error::merl::Problem;
 use crate::error::merl::{DIMENSIONS, HEADER, LENGTH};
-use crate::geometry::{Pair, Vector, cartesian, half_vector, reflect};
-use crate::{Directions, Error, Samples, Sampling, file};
+use crate::geometry::{DirectionPair, Vector, cartesian, half_vector, reflect};
+use crate::{Error, Samples, Sampling, file};
 
 /// Steps of the half vector's polar angle.
 pub const THETA_H: usize = 90;
@@ -53,12 +53,12 @@ const NOTHING: f64 = -1.0;
 /// A MERL table. It holds 35 MB.
 ///
 /// ```
-/// use elm_datasets::{Directions, lobes, merl::Merl};
+/// use elm_datasets::{Angles, DirectionPair, lobes, merl::Merl};
 /// let red_plastic = Merl::from_fn(|d| {
 ///     let gloss = lobes::ggx(d, 0.04, 0.2);
 ///     [0.2 + gloss, gloss, gloss]
 /// });
-/// let head_on = Directions { theta_i: 0.0, phi_i: 0.0, theta_o: 0.0, phi_o: 0.0 };
+/// let head_on = DirectionPair::from(Angles { theta_i: 0.0, phi_i: 0.0, theta_o: 0.0, phi_o: 0.0 });
 /// let [red, green, blue] = red_plastic.at(&head_on);
 /// assert!((red - 0.2 - green).abs() < 1e-12 && green == blue);
 /// ```
@@ -146,7 +146,7 @@ impl Merl {
     /// Tabulates a BRDF in 1/sr: red, green and blue at the [middle of each cell](cell). Cells
     /// below the horizon, and values that are negative or not finite, become entries without a
     /// measurement, in all three channels.
-    pub fn from_fn(mut brdf: impl FnMut(&Directions) -> [f64; 3]) -> Self {
+    pub fn from_fn(mut brdf: impl FnMut(&DirectionPair) -> [f64; 3]) -> Self {
         let mut numbers = vec![NOTHING; 3 * CELLS];
         for index in 0..CELLS {
             let (row, phi_d) = (index / PHI_D, index % PHI_D);
@@ -187,12 +187,12 @@ impl Merl {
     /// Negative where there is no measurement and below the horizon; NaN for a direction that is
     /// not finite, and for opposite directions, which have no half vector.
     #[must_use]
-    pub fn at(&self, directions: impl Into<Pair>) -> [f64; 3] {
+    pub fn at(&self, directions: &DirectionPair) -> [f64; 3] {
         let number = |channel: usize, index: usize| self.numbers.get(channel * CELLS + index);
-        let Pair {
+        let DirectionPair {
             incident: light,
             outgoing: viewer,
-        } = directions.into();
+        } = *directions;
         let Some(index) = index_of(light, viewer) else {
             return [f64::NAN; 3];
         };
@@ -250,12 +250,12 @@ impl Brdf for Merl {
 
     fn eval_into(
         &self,
-        pairs: &[Pair],
+        pairs: &[DirectionPair],
         mut values: ArrayViewMut2<'_, f64>,
     ) -> Result<(), EvalError> {
         check_arguments(pairs, &values, 3)?;
         for (mut row, pair) in values.rows_mut().into_iter().zip(pairs) {
-            for (to, value) in row.iter_mut().zip(self.at(*pair)) {
+            for (to, value) in row.iter_mut().zip(self.at(pair)) {
                 // NaN, too, becomes 0.
                 *to = value.max(0.0);
             }
@@ -270,7 +270,7 @@ impl Brdf for Merl {
 /// The middle is that of the indices: $\theta_h = ((i + 1/2)/90)^2\\, \pi/2$.
 #[must_use]
 #[allow(clippy::cast_precision_loss)]
-pub fn cell(theta_h: usize, theta_d: usize, phi_d: usize) -> Option<Directions> {
+pub fn cell(theta_h: usize, theta_d: usize, phi_d: usize) -> Option<DirectionPair> {
     if theta_h >= THETA_H || theta_d >= THETA_D || phi_d >= PHI_D {
         return None;
     }
@@ -285,10 +285,11 @@ pub fn cell(theta_h: usize, theta_d: usize, phi_d: usize) -> Option<Directions> 
     let light = [cos * x + sin * z, y, cos * z - sin * x];
     let viewer = reflect(light, cartesian(theta_h, 0.0));
     (light[2] > 0.0 && viewer[2] > 0.0).then(|| {
-        Directions::from(&Pair {
+        let pair = DirectionPair {
             incident: light,
             outgoing: viewer,
-        })
+        };
+        pair.through_angles()
     })
 }
 

@@ -19,8 +19,9 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
+use crate::geometry::DirectionPair;
 use crate::lobes::Cosines;
-use crate::{Directions, Error, Samples, Sampling};
+use crate::{Error, Samples, Sampling};
 
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
@@ -41,7 +42,7 @@ const NOISE: f64 = 0.02;
 /// The BRDF in 1/sr at one pair of directions, red, green and blue, without noise; 0 where light
 /// or viewer is below the horizon.
 #[must_use]
-pub fn truth(directions: &Directions) -> [f64; 3] {
+pub fn truth(directions: &DirectionPair) -> [f64; 3] {
     let Some(angles) = Cosines::of(directions) else {
         return [0.0; 3];
     };
@@ -120,8 +121,8 @@ mod tests {
             for (a, b) in truth(pair).into_iter().zip(truth(&pair.swapped())) {
                 assert!((a - b).abs() <= 1e-12 * a);
             }
-            let below = Directions {
-                theta_o: 2.0,
+            let below = DirectionPair {
+                outgoing: [0.0, 0.1, -0.9],
                 ..*pair
             };
             assert_eq!(truth(&below), [0.0; 3]);

@@ -17,9 +17,10 @@ use ndarray::Array2;
 
 use crate::error::Column;
 pub use crate::error::pbrt::Problem;
+use crate::geometry::{Angles, DirectionPair};
 use crate::scattered::HORIZON_TOLERANCE;
 use crate::text::shorten;
-use crate::{Directions, Error, Samples, file};
+use crate::{Error, Samples, file};
 
 const ANGLES: [&str; 4] = ["theta_i", "phi_i", "theta_o", "phi_o"];
 
@@ -104,12 +105,12 @@ fn parse(path: &Path, bytes: &[u8], missing: bool) -> Result<Samples, Error> {
             values.push(words.value(count - channel, missing)?);
         }
         let [theta_i, phi_i, theta_o, phi_o] = angles;
-        directions.push(Directions {
+        directions.push(DirectionPair::from(Angles {
             theta_i,
             phi_i,
             theta_o,
             phi_o,
-        });
+        }));
     }
     let mut table = Array2::zeros((directions.len(), count));
     for (to, from) in table.iter_mut().zip(values) {

@@ -38,8 +38,9 @@ use ndarray::{Array2, Axis};
 use crate::csv::{Cells, Table, line_of};
 use crate::error::scattered::{ANGLES, VECTORS};
 pub use crate::error::scattered::{AngleUnit, List, Problem};
+use crate::geometry::{Angles, DirectionPair};
 use crate::text::shorten;
-use crate::{Directions, Error, Samples, channel, file};
+use crate::{Error, Samples, channel, file};
 pub(crate) use angles::HORIZON_TOLERANCE;
 use angles::{Found, Reader};
 use columns::Plan;
@@ -78,7 +79,7 @@ pub struct Columns {
 /// let degrees = Options { unit: AngleUnit::Degrees, ..Options::default() };
 /// let samples = scattered::read(&path, &degrees)?;
 /// assert_eq!(samples.channels, ["grey"]);
-/// assert!((samples.directions[0].theta_i.cos() - 0.5).abs() < 1e-15);
+/// assert!((samples.directions[0].incident[2] - 0.5).abs() < 1e-15);
 /// # Ok(())
 /// # }
 /// ```
@@ -255,19 +256,23 @@ fn reflected(
         .select(Axis(1), &plan.channels)
         .select(Axis(0), &rows);
     for (index, pair) in pairs.iter().enumerate() {
-        for (weighted, theta, direction, angle) in [
+        for (weighted, cos, direction, angle) in [
             (
                 options.cosine_weighted,
-                pair.theta_i,
+                pair.incident[2],
                 "the light",
                 "theta_i",
             ),
-            (choice.scatter_cosine, pair.theta_o, "the viewer", "theta_o"),
+            (
+                choice.scatter_cosine,
+                pair.outgoing[2],
+                "the viewer",
+                "theta_o",
+            ),
         ] {
             if !weighted {
                 continue;
             }
-            let cos = theta.cos();
             // The cosine of the closest number to pi/2 is 6e-17.
             if cos <= f64::EPSILON {
                 return Err((Some(rows[index]), Problem::NoCosine { direction, angle }));
@@ -363,14 +368,11 @@ fn write_checked(out: &mut dyn Write, samples: &Samples) -> io::Result<()> {
     let channels = samples.channels.iter().map(String::as_str);
     writer.write_record(ANGLES.into_iter().chain(channels))?;
     for (pair, values) in samples.directions.iter().zip(samples.values.rows()) {
-        let numbers = angles(pair).into_iter().chain(values.iter().copied());
+        let angles = Angles::of(pair).to_array();
+        let numbers = angles.into_iter().chain(values.iter().copied());
         writer.write_record(numbers.map(|number| format!("{number:?}")))?;
     }
     writer.flush()
-}
-
-fn angles(pair: &Directions) -> [f64; 4] {
-    [pair.theta_i, pair.phi_i, pair.theta_o, pair.phi_o]
 }
 
 /// Refuses what `read` would refuse.
@@ -427,7 +429,7 @@ fn check_samples(samples: &Samples) -> Result<(), (usize, Problem)> {
 }
 
 fn check_row(
-    pair: &Directions,
+    pair: &DirectionPair,
     values: &Array2<f64>,
     row: usize,
     channels: &[String],
@@ -435,14 +437,18 @@ fn check_row(
     let names = ANGLES
         .into_iter()
         .chain(channels.iter().map(String::as_str));
-    let numbers = angles(pair).into_iter().chain(values.row(row).to_vec());
+    let angles = Angles::of(pair);
+    let numbers = angles
+        .to_array()
+        .into_iter()
+        .chain(values.row(row).to_vec());
     for (column, found) in names.zip(numbers) {
         if !found.is_finite() {
             let column = shorten(column);
             return Err(Problem::NotFinite { column, found });
         }
     }
-    for (angle, found) in [("theta_i", pair.theta_i), ("theta_o", pair.theta_o)] {
+    for (angle, found) in [("theta_i", angles.theta_i), ("theta_o", angles.theta_o)] {
         // What the reader would take for another number, or leave out.
         if !(0.0..=std::f64::consts::FRAC_PI_2).contains(&found) {
             let unit = AngleUnit::Radians;

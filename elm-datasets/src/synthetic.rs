@@ -22,10 +22,11 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
+use crate::Error;
 use crate::curet::{MaterialId, rig};
+use crate::geometry::DirectionPair;
 use crate::lobes::{ggx, oren_nayar, ward};
 use crate::measurements::{Invalid, Material, Measurements, Origin};
-use crate::{Directions, Error};
 
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 /// Materials with next to no reflectance.
@@ -81,12 +82,12 @@ pub fn measurements(seed: u64, ids: &[MaterialId], invalid: Invalid) -> Measurem
 /// The BRDF of a material in 1/sr at one pair of directions, red, green and blue: what is
 /// measured, before noise and rounding.
 #[must_use]
-pub fn truth(id: MaterialId, directions: &Directions) -> [f64; 3] {
+pub fn truth(id: MaterialId, directions: &DirectionPair) -> [f64; 3] {
     Recipe::of(id).evaluate(directions)
 }
 
 /// Values of shape (directions, 3).
-fn measure(seed: u64, id: MaterialId, directions: &[Directions]) -> Array2<f64> {
+fn measure(seed: u64, id: MaterialId, directions: &[DirectionPair]) -> Array2<f64> {
     let recipe = Recipe::of(id);
     let offset = if id.number() == OFFSET_MATERIAL {
         OFFSET_NOISE
@@ -176,7 +177,7 @@ impl Recipe {
         }
     }
 
-    fn evaluate(&self, directions: &Directions) -> [f64; 3] {
+    fn evaluate(&self, directions: &DirectionPair) -> [f64; 3] {
         let base = oren_nayar(directions, 1.0, self.sigma);
         match self.family {
             Family::Matte | Family::Dark => self.colour.map(|albedo| albedo * base),

@@ -10,7 +10,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use elm_datasets::merl::{Merl, Problem, cell};
-use elm_datasets::{Directions, Error, Sampling, lobes};
+use elm_datasets::{Angles, DirectionPair, Error, Sampling, lobes};
 use proptest::prelude::*;
 
 const CELLS: usize = 90 * 90 * 180;
@@ -52,7 +52,8 @@ fn vector(theta: f64, phi: f64) -> Vector {
 
 /// The three real numbers whose whole parts are the indices, from the frame (t, b, h) around the
 /// half vector: b is horizontal, t points down the slope of h.
-fn coordinates(d: &Directions) -> [f64; 3] {
+fn coordinates(pair: &DirectionPair) -> [f64; 3] {
+    let d = Angles::of(pair);
     let (light, viewer) = (vector(d.theta_i, d.phi_i), vector(d.theta_o, d.phi_o));
     let h = unit([0, 1, 2].map(|k| light[k] + viewer[k]));
     let b = unit(cross([0.0, 0.0, 1.0], h));
@@ -68,7 +69,7 @@ fn coordinates(d: &Directions) -> [f64; 3] {
     ]
 }
 
-fn random(rows: usize) -> Vec<Directions> {
+fn random(rows: usize) -> Vec<DirectionPair> {
     Sampling::Random { rows, seed: 7 }.directions().unwrap()
 }
 
@@ -115,12 +116,12 @@ fn cells_in_the_plane_of_incidence_are_those_worked_out_by_hand() {
         // theta_h = 0.005: 90 sqrt(5.6e-5) = 0.67; theta_d = 60.005.
         (60.01, 60.0, 60),
     ] {
-        let pair = Directions {
+        let pair = DirectionPair::from(Angles {
             theta_i: a.to_radians(),
             phi_i: 0.0,
             theta_o: b.to_radians(),
             phi_o: PI,
-        };
+        });
         let [red, ..] = table.at(&pair);
         assert_eq!(
             ((red * 1500.0).round() / 180.0).floor(),
@@ -130,7 +131,7 @@ fn cells_in_the_plane_of_incidence_are_those_worked_out_by_hand() {
     }
 }
 
-fn ggx(d: &Directions) -> [f64; 3] {
+fn ggx(d: &DirectionPair) -> [f64; 3] {
     let gloss = lobes::ggx(d, 0.05, 0.3);
     [gloss, gloss + 0.1, gloss + 0.2]
 }
@@ -164,7 +165,11 @@ fn what_is_written_is_read_back_and_unmeasured_entries_are_left_out_of_samples()
     let path = dir.path().join("half.binary");
     // Nothing where the light is beyond 45 degrees, in green only.
     let table = Merl::from_fn(|d| {
-        let green = if d.theta_i > 0.785 { f64::NAN } else { 0.2 };
+        let green = if Angles::of(d).theta_i > 0.785 {
+            f64::NAN
+        } else {
+            0.2
+        };
         [0.1, green, 0.3]
     });
     table.write(&path).unwrap();
@@ -187,20 +192,20 @@ fn what_is_written_is_read_back_and_unmeasured_entries_are_left_out_of_samples()
 fn directions_without_a_cell_are_not_numbers_and_no_reason_to_panic() {
     let table = Merl::from_fn(ggx);
     for (theta_i, phi_o) in [(f64::NAN, 0.0), (f64::INFINITY, 0.0), (0.1, f64::NAN)] {
-        let pair = Directions {
+        let pair = DirectionPair::from(Angles {
             theta_i,
             phi_i: 0.0,
             theta_o: 0.2,
             phi_o,
-        };
+        });
         assert!(table.at(&pair).iter().all(|value| value.is_nan()));
     }
-    let below = Directions {
+    let below = DirectionPair::from(Angles {
         theta_i: 3.0,
         phi_i: 0.0,
         theta_o: 3.0,
         phi_o: 1.0,
-    };
+    });
     assert!(table.at(&below).iter().all(|&value| value < 0.0));
 }
 
@@ -267,7 +272,7 @@ proptest! {
         file(&path, &support::mutate(start, changes), length);
         match Merl::read(&path) {
             Ok(table) => {
-                let pair = Directions { theta_i: 0.1, phi_i: 0.0, theta_o: 0.1, phi_o: 2.0 };
+                let pair = DirectionPair::from(Angles { theta_i: 0.1, phi_i: 0.0, theta_o: 0.1, phi_o: 2.0 });
                 let _ = table.at(&pair);
                 prop_assert!(table.invalid() <= 3 * CELLS);
             }
@@ -279,7 +284,7 @@ proptest! {
     #[test]
     fn any_direction_has_a_value(angles in prop::array::uniform4(any::<f64>())) {
         let [theta_i, phi_i, theta_o, phi_o] = angles;
-        let _ = EMPTY.with(|table| table.at(&Directions { theta_i, phi_i, theta_o, phi_o }));
+        let _ = EMPTY.with(|table| table.at(&Angles { theta_i, phi_i, theta_o, phi_o }.into()));
     }
 }
 

@@ -9,8 +9,9 @@ mod support;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use elm_datasets::geometry::NORMAL;
 use elm_datasets::merl::Merl;
-use elm_datasets::{Error, Format, Invalid, OpenOptions, Sampling, open, pbrt, scattered};
+use elm_datasets::{Angles, Error, Format, Invalid, OpenOptions, Sampling, open, pbrt, scattered};
 use ndarray::array;
 use proptest::prelude::*;
 
@@ -34,7 +35,7 @@ fn numbers_are_read_across_lines_and_comments() {
         let samples = pbrt::read(file(dir.path(), "x.brdf", text)).unwrap();
         assert_eq!(samples.channels, ["450 nm", "650 nm"]);
         assert_eq!(samples.values, array![[0.25, 0.5], [1.0, -2e-3]]);
-        let first = samples.directions[0];
+        let first = Angles::of(&samples.directions[0]);
         assert_eq!((first.theta_i, first.phi_i), (0.1, 0.2));
         assert_eq!((first.theta_o, first.phi_o), (0.3, -3.0));
     }
@@ -187,7 +188,7 @@ fn negative_values_are_counted_and_treated_as_asked() {
         assert_eq!(opened.invalid, 1);
         assert_eq!(opened.samples.values.column(0).to_vec(), expected);
         assert_eq!(opened.samples.directions.len(), expected.len());
-        assert_eq!(opened.samples.directions.last().unwrap().theta_i, 0.0);
+        assert_eq!(opened.samples.directions.last().unwrap().incident, NORMAL);
     }
     let only = file(
         dir.path(),

@@ -7,7 +7,7 @@ mod support;
 use std::fs;
 
 use elm_datasets::curet::{self, rig};
-use elm_datasets::{Directions, Invalid, MaterialId, Measurements, Origin};
+use elm_datasets::{Angles, DirectionPair, Invalid, MaterialId, Measurements, Origin};
 use support::{all, real};
 
 fn read(invalid: Invalid) -> Option<(std::path::PathBuf, Measurements)> {
@@ -68,14 +68,15 @@ fn single_values_are_where_the_file_has_them() {
         assert_eq!(set.materials[0].values[[0, 0]], 0.200);
         assert_eq!(set.materials[10].values[[204, 0]], 0.083);
     }
-    let first = set.directions[0];
+    let first = Angles::of(&set.directions[0]);
     assert_eq!((first.theta_o, first.phi_o), (1.389566, -1.970402));
     assert_eq!((first.theta_i, first.phi_i), (1.374447, -1.570796));
 }
 
 /// Greatest difference in the three numbers that an isotropic surface sees, in radians.
-fn apart(a: &Directions, b: &Directions) -> f64 {
-    let [theta_i, theta_o] = [a.theta_i - b.theta_i, a.theta_o - b.theta_o];
+fn apart(a: &DirectionPair, b: &DirectionPair) -> f64 {
+    let (of_a, of_b) = (Angles::of(a), Angles::of(b));
+    let [theta_i, theta_o] = [of_a.theta_i - of_b.theta_i, of_a.theta_o - of_b.theta_o];
     let between = a.cos_between().acos() - b.cos_between().acos();
     [theta_i, theta_o, between]
         .into_iter()
@@ -95,14 +96,15 @@ fn the_rig_has_the_tables_directions_in_the_tables_order() {
         } else {
             &rig[index..=index]
         };
-        let azimuths_agree = |made: &Directions| {
+        let azimuths_agree = |made: &DirectionPair| {
+            let (real, made) = (Angles::of(real), Angles::of(made));
             // As lengths on the sphere: without a polar angle there is no azimuth.
             [
                 (real.phi_i - made.phi_i, made.theta_i),
                 (real.phi_o - made.phi_o, made.theta_o),
             ]
             .into_iter()
-            .all(|(difference, theta)| (difference * theta.sin()).abs() < 3e-6)
+            .all(|(turned, theta)| (2.0 * (turned / 2.0).sin() * theta.sin()).abs() < 3e-6)
         };
         let found = same
             .iter()
@@ -134,10 +136,10 @@ fn the_angles_reach_as_far_as_stated_and_the_blocks_are_the_stations() {
     let Some((_, set)) = read(Invalid::Clamp) else {
         return;
     };
-    let highest = |angle: fn(&Directions) -> f64| {
+    let highest = |angle: fn(&Angles) -> f64| {
         set.directions
             .iter()
-            .map(angle)
+            .map(|pair| angle(&Angles::of(pair)))
             .fold(0.0, f64::max)
             .to_degrees()
     };

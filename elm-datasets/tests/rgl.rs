@@ -12,7 +12,7 @@ use std::path::Path;
 
 use bsdf::{Field, Ggx, bytes, file, floats, tabulate};
 use elm_datasets::rgl::{Channels, Problem, Rgl};
-use elm_datasets::{Directions, Error, Sampling, scattered};
+use elm_datasets::{Angles, DirectionPair, Error, Sampling, scattered};
 
 const ELEVATIONS: [f64; 2] = [0.25, 1.0];
 
@@ -46,7 +46,8 @@ fn smooth(k: usize, x: f64, y: f64) -> f64 {
 }
 
 /// The value on paper, by the publication's formulas.
-fn expected(d: &Directions, channel: usize, jacobian: bool) -> f64 {
+fn expected(pair: &DirectionPair, channel: usize, jacobian: bool) -> f64 {
+    let d = Angles::of(pair);
     let unit = |theta: f64, phi: f64| {
         [
             theta.sin() * phi.cos(),
@@ -77,7 +78,7 @@ fn expected(d: &Directions, channel: usize, jacobian: bool) -> f64 {
     rest * highlight / d.theta_o.cos()
 }
 
-fn random(rows: usize) -> Vec<Directions> {
+fn random(rows: usize) -> Vec<DirectionPair> {
     Sampling::Random { rows, seed: 3 }.directions().unwrap()
 }
 
@@ -123,11 +124,12 @@ fn turning_light_and_viewer_together_changes_nothing() {
     let rgl = Rgl::from_bytes(&file(&on_paper("rgb", 1))).unwrap();
     for (pair, turn) in random(200).into_iter().zip(0..) {
         let turn = f64::from(turn) / 10.0;
-        let turned = Directions {
-            phi_i: pair.phi_i + turn,
-            phi_o: pair.phi_o + turn,
-            ..pair
-        };
+        let angles = Angles::of(&pair);
+        let turned = DirectionPair::from(Angles {
+            phi_i: angles.phi_i + turn,
+            phi_o: angles.phi_o + turn,
+            ..angles
+        });
         for (a, b) in rgl.at(&pair).into_iter().zip(rgl.at(&turned)) {
             // Azimuths up to 20 lose 4e-15.
             assert!((a - b).abs() < 1e-12 * a);
@@ -146,16 +148,17 @@ fn errors(coarse: usize) -> (f64, f64) {
     let (mut worst, mut sum, mut count) = (0.0_f64, 0.0, 0);
     for (pair, k) in random(2000).into_iter().zip(0..) {
         // As the file has them, in 32 bits.
-        let pair = Directions {
+        let angles = Angles {
             theta_i: f64::from(elevations[k % 5] as f32),
-            ..pair
+            ..Angles::of(&pair)
         };
+        let pair = DirectionPair::from(angles);
         // Towards the horizon the shadowing is too steep for tables this coarse.
-        if pair.theta_o > 1.1 {
+        if angles.theta_o > 1.1 {
             continue;
         }
         let cos_between = pair.cos_between();
-        let (cos_i, cos_o) = (pair.theta_i.cos(), pair.theta_o.cos());
+        let (cos_i, cos_o) = (pair.incident[2], pair.outgoing[2]);
         let cos_m = (cos_i + cos_o) / (2.0 + 2.0 * cos_between).sqrt();
         let exact = ggx.brdf(cos_i, cos_o, cos_m.min(1.0).acos());
         for (found, facet) in rgl.at(&pair).into_iter().zip(ggx.facet) {
@@ -183,12 +186,12 @@ fn a_microfacet_model_comes_back_with_an_error_of_second_order() {
 fn there_is_no_reflection_at_or_below_the_horizon() {
     let rgl = Rgl::from_bytes(&file(&on_paper("rgb", 1))).unwrap();
     for (theta_i, theta_o) in [(1.6, 0.2), (0.2, 1.6), (3.0, 3.0), (f64::NAN, 0.1)] {
-        let pair = Directions {
+        let pair = DirectionPair::from(Angles {
             theta_i,
             phi_i: 0.0,
             theta_o,
             phi_o: 1.0,
-        };
+        });
         assert_eq!(rgl.at(&pair), [0.0; 3]);
     }
 }
@@ -203,12 +206,12 @@ fn out_of_gamut_colours_are_cut_off_and_spectra_are_not() {
             }
         }
         let rgl = Rgl::from_bytes(&file(&fields)).unwrap();
-        let pair = Directions {
+        let pair = DirectionPair::from(Angles {
             theta_i: 0.5,
             phi_i: 0.0,
             theta_o: 0.0,
             phi_o: 0.0,
-        };
+        });
         for value in rgl.at(&pair) {
             assert!((value - expected).abs() < 1e-15);
         }

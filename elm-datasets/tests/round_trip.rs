@@ -4,7 +4,7 @@ mod support;
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use elm_datasets::{Invalid, curet, synthetic};
+use elm_datasets::{Angles, DirectionPair, Invalid, curet, synthetic};
 use proptest::prelude::*;
 use support::all;
 
@@ -20,8 +20,11 @@ proptest! {
         let mut set = synthetic::measurements(2, &all(), Invalid::Keep);
         for (row, (&value, &(theta, phi))) in values.iter().zip(&angles).enumerate() {
             set.materials[material].values[[row, 1]] = value;
-            set.directions[row].theta_i = theta;
-            set.directions[row].phi_o = phi;
+            set.directions[row] = DirectionPair::from(Angles {
+                theta_i: theta,
+                phi_o: phi,
+                ..Angles::of(&set.directions[row])
+            });
         }
         let dir = tempfile::tempdir().unwrap();
         curet::write(dir.path(), &set).unwrap();
@@ -30,8 +33,11 @@ proptest! {
             prop_assert!((&a.values - &b.values).iter().all(|difference| difference.abs() < 5.1e-4));
         }
         for (a, b) in read.directions.iter().zip(&set.directions) {
+            let (a, b) = (Angles::of(a), Angles::of(b));
             prop_assert!((a.theta_i - b.theta_i).abs() < 5.1e-7);
-            prop_assert!((a.phi_o - b.phi_o).abs() < 5.1e-7);
+            // As a length on the sphere, where half a turn is the same in either direction.
+            let (sin, turned) = (b.theta_o.sin(), (a.phi_o - b.phi_o).rem_euclid(TAU));
+            prop_assert!(turned.min(TAU - turned) * sin < 5.1e-7);
         }
     }
 }

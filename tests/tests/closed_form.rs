@@ -12,7 +12,6 @@ use elm_brdf::features::Features;
 use elm_brdf::link::Link;
 use elm_brdf::model::{BrdfParams, ScaledOnce};
 use elm_brdf::protocol::{Folds, cross_validate};
-use elm_datasets::geometry::pairs;
 use elm_datasets::{Invalid, MaterialId, Measurements, curet, synthetic};
 use ndarray::{Array2, ArrayView2, Axis, concatenate};
 
@@ -42,7 +41,7 @@ fn largest(values: ArrayView2<'_, f64>) -> f64 {
 }
 
 fn one_factorisation_is_refitting(data: &Measurements) {
-    let x = Features::Paper.compute(&pairs(&data.directions));
+    let x = Features::Paper.compute(&data.directions);
     let values: Vec<_> = data.materials.iter().map(|m| m.values.view()).collect();
     let t = concatenate(Axis(1), &values).unwrap();
     let folds = Folds::new(x.nrows(), 10, 1).unwrap();

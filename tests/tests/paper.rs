@@ -12,7 +12,7 @@ use elm_brdf::link::Link;
 use elm_brdf::model::BrdfParams;
 use elm_brdf::protocol::{Folds, cross_validate};
 use elm_datasets::Brdf;
-use elm_datasets::geometry::{Pair, pairs};
+use elm_datasets::geometry::DirectionPair;
 use elm_datasets::{Invalid, MaterialId, Measurements, synthetic};
 use ndarray::{Axis, s};
 
@@ -60,7 +60,7 @@ fn with_as_many_neurons_as_rows_equation_10_interpolates_and_agrees_with_equatio
             .scale(scale)
             .seed(2)
     };
-    let rows = pairs(&samples.directions[..40]);
+    let rows = &samples.directions[..40];
     let values = samples.values.slice(s![..40, ..]);
     let exact = params(network(30.0).solver(Inverse))
         .fit(&rows, values)
@@ -77,7 +77,7 @@ fn with_as_many_neurons_as_rows_equation_10_interpolates_and_agrees_with_equatio
 fn repeating_the_first_input_as_the_third_is_a_wider_weight_and_nothing_else() {
     // The paper lists cos(theta_i) beside L.N, which it equals.
     let data = stand_in();
-    let x = Features::Paper.compute(&pairs(&data.directions));
+    let x = Features::Paper.compute(&data.directions);
     assert_abs_diff_eq!(x.column(0), x.column(2), epsilon = 1e-15);
     let without = x.select(Axis(1), &[0, 1, 3, 4, 5]);
     let rank = |x: &ndarray::Array2<f64>| {
@@ -92,7 +92,7 @@ fn repeating_the_first_input_as_the_third_is_a_wider_weight_and_nothing_else() {
 #[test]
 fn the_papers_inputs_are_not_reciprocal() {
     // V.R is symmetric in light and viewer, the order of the cosines is not.
-    let pair = Pair::from(&elm_datasets::Directions {
+    let pair = DirectionPair::from(elm_datasets::Angles {
         theta_i: 0.3,
         phi_i: 0.1,
         theta_o: 1.1,

@@ -15,7 +15,6 @@ use elm_brdf::albedo;
 use elm_brdf::model::Tuned;
 use elm_brdf::reference;
 use elm_datasets::Brdf;
-use elm_datasets::geometry::pairs;
 use elm_datasets::{Invalid, MaterialId, OpenOptions, Samples, curet, open, paint, synthetic};
 
 /// Rows of a synthetic paint: few, and many.
@@ -43,7 +42,7 @@ fn nearest() -> Result<Box<elm_brdf::fit::AnyFit>, Box<dyn Error>> {
 
 /// One row of the table.
 fn row(name: &str, samples: &Samples, seeds: u64) -> Result<f64, Box<dyn Error>> {
-    let pairs = pairs(&samples.directions);
+    let pairs = &samples.directions;
     let values = samples.values.view();
     let implied = largest(nearest()?.fit(&pairs, values)?.as_ref())?;
     let mut most = (0.0, 0.0, String::new());

@@ -14,7 +14,7 @@ use elm_brdf::fit::Fit;
 use elm_brdf::model::Tuned;
 use elm_brdf::prior::{Prior, PriorParams};
 use elm_brdf::protocol::Folds;
-use elm_datasets::geometry::{Pair, pairs};
+use elm_datasets::geometry::DirectionPair;
 use elm_datasets::{Invalid, MaterialId, curet};
 use ndarray::{Array2, Axis};
 use rand::SeedableRng;
@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let seeds: u64 = arguments.next().map_or(Ok(3), |seeds| seeds.parse())?;
     let ids: Vec<MaterialId> = MaterialId::all().collect();
     let data = curet::read(&dir, &ids, Invalid::Clamp)?;
-    let pairs = pairs(&data.directions);
+    let pairs = &data.directions;
     let shape = (pairs.len(), data.materials.len());
     let values = Array2::from_shape_fn(shape, |(row, m)| data.materials[m].values.row(row).sum());
     let values = values / data.channels.len() as f64;
@@ -72,7 +72,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// For each material what all others teach, but other measurements of the same specimen.
 fn priors(
     seed: u64,
-    pairs: &[Pair],
+    pairs: &[DirectionPair],
     values: &Array2<f64>,
     ids: &[MaterialId],
 ) -> Result<Vec<Prior>, Box<dyn Error>> {
@@ -93,7 +93,7 @@ fn priors(
 fn run(
     seed: u64,
     count: usize,
-    pairs: &[Pair],
+    pairs: &[DirectionPair],
     values: &Array2<f64>,
     priors: &[Prior],
 ) -> Result<Vec<ndarray::Array1<f64>>, Box<dyn Error>> {
@@ -105,13 +105,13 @@ fn run(
         let (test, mut train): (Vec<usize>, Vec<usize>) =
             (0..pairs.len()).partition(|&row| folds.of_row(row) == fold);
         train.sort_unstable();
-        let all: Vec<Pair> = train.iter().map(|&row| pairs[row]).collect();
+        let all: Vec<DirectionPair> = train.iter().map(|&row| pairs[row]).collect();
         let count = count.min(train.len());
         let mut drawn = train.clone();
         drawn.shuffle(&mut random);
         drawn.truncate(count);
-        let at: Vec<Pair> = drawn.iter().map(|&row| pairs[row]).collect();
-        let asked: Vec<Pair> = test.iter().map(|&row| pairs[row]).collect();
+        let at: Vec<DirectionPair> = drawn.iter().map(|&row| pairs[row]).collect();
+        let asked: Vec<DirectionPair> = test.iter().map(|&row| pairs[row]).collect();
         let truth = values.select(Axis(0), &test);
         let few = values.select(Axis(0), &drawn);
         let tuned = Tuned {
@@ -127,7 +127,7 @@ fn run(
             squares[1][material] += error.mapv(|e| e * e).sum();
             let chosen = prior.design(&all, count)?;
             let rows: Vec<usize> = chosen.iter().map(|&place| train[place]).collect();
-            let at: Vec<Pair> = rows.iter().map(|&row| pairs[row]).collect();
+            let at: Vec<DirectionPair> = rows.iter().map(|&row| pairs[row]).collect();
             let few = values.select(Axis(0), &rows).select(Axis(1), &[material]);
             let error = &prior.fit(&at, few.view())?.eval(&asked)? - &truth;
             squares[2][material] += error.mapv(|e| e * e).sum();

@@ -6,13 +6,13 @@ use crate::account::{Reason, Savings, Tally};
 use crate::error::Result;
 use crate::shelf::Shelf;
 use crate::vector::{BLACK, Rgb};
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// One evaluation that a path waits for.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Request {
     pub(crate) material: usize,
-    pub(crate) pair: Pair,
+    pub(crate) pair: DirectionPair,
     /// Index of the path.
     pub(crate) path: usize,
     /// The light, or [`SCATTERED`].
@@ -37,7 +37,7 @@ pub(crate) struct Batch {
     /// One per request, once evaluated.
     pub(crate) values: Vec<Rgb>,
     order: Vec<usize>,
-    pairs: Vec<Pair>,
+    pairs: Vec<DirectionPair>,
     /// For each request in order, the pair that stands for it.
     pair_of: Vec<usize>,
     /// For the evaluation of a material.

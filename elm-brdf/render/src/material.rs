@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::proxy::{Proxy, Survey};
 use crate::vector::{Rgb, largest, luminance, scaled, times};
 use elm_datasets::Brdf;
-use elm_datasets::geometry::{Pair, Vector};
+use elm_datasets::geometry::{DirectionPair, Vector};
 
 /// A model may pass the largest value of its [`Survey`] by this factor; beyond, it is cut off.
 const CEILING_MARGIN: f64 = 2.0;
@@ -18,14 +18,14 @@ const CEILING_MARGIN: f64 = 2.0;
 /// the renderer leave out what cannot be seen.
 ///
 /// ```
-/// use elm_datasets::geometry::{Pair, cartesian};
+/// use elm_datasets::geometry::{DirectionPair, cartesian};
 /// use elm_brdf_render::Material;
 /// use elm_datasets::lobes::Formula;
 /// let chalk = Material::new(Box::new(Formula::lambert(0.8)?), [1.0; 3], false)?;
 /// let outgoing = cartesian(0.5, 0.0);
 /// let (incident, density) = chalk.sample(outgoing, [0.3, 0.7]);
 /// assert!((chalk.pdf(outgoing, incident) / density - 1.0).abs() < 1e-9);
-/// let value = chalk.eval(&[Pair { incident, outgoing }])?[0][0];
+/// let value = chalk.eval(&[DirectionPair { incident, outgoing }])?[0][0];
 /// assert!((value - 0.8 / std::f64::consts::PI).abs() < 1e-12);
 /// assert!((chalk.albedo()[0].1 - 0.8).abs() < 0.01);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -57,7 +57,7 @@ impl Material {
             return Err(Error::Tint { found: tint });
         }
         let survey = Survey::new();
-        let raw = |pairs: &[Pair]| -> Result<Vec<Rgb>> {
+        let raw = |pairs: &[DirectionPair]| -> Result<Vec<Rgb>> {
             let mut room = Vec::new();
             evaluate(&*brdf, pairs, &mut room)?;
             let rows = room.chunks_exact(channels);
@@ -103,7 +103,7 @@ impl Material {
     ///
     /// # Errors
     /// Whatever the model's own evaluation reports.
-    pub fn eval(&self, pairs: &[Pair]) -> Result<Vec<Rgb>> {
+    pub fn eval(&self, pairs: &[DirectionPair]) -> Result<Vec<Rgb>> {
         let mut values = Vec::new();
         self.eval_into(pairs, &mut Vec::new(), &mut values)?;
         Ok(values)
@@ -113,7 +113,7 @@ impl Material {
     /// one call to the next, both save allocations.
     pub(crate) fn eval_into(
         &self,
-        pairs: &[Pair],
+        pairs: &[DirectionPair],
         room: &mut Vec<f64>,
         values: &mut Vec<Rgb>,
     ) -> Result<()> {
@@ -183,7 +183,7 @@ impl std::fmt::Debug for Material {
 }
 
 /// The values of each pair, one pair after another, in place of what is in `room`.
-fn evaluate(brdf: &dyn Brdf, pairs: &[Pair], room: &mut Vec<f64>) -> Result<()> {
+fn evaluate(brdf: &dyn Brdf, pairs: &[DirectionPair], room: &mut Vec<f64>) -> Result<()> {
     let shape = (pairs.len(), brdf.channels());
     room.clear();
     room.resize(shape.0 * shape.1, 0.0);

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use crate::distribution::Distribution2;
-use elm_datasets::geometry::{Pair, Vector, cartesian};
+use elm_datasets::geometry::{DirectionPair, Vector, cartesian};
 
 /// Viewing angles of the table.
 const VIEWS: usize = 16;
@@ -31,14 +31,14 @@ pub(crate) struct Proxy {
 /// What a table is made of: every pair at which the model is asked, by viewing angle.
 pub(crate) struct Survey {
     /// Cell by cell, by view, theta_i and azimuth; the steps of a cell one after another.
-    pub(crate) cells: Vec<Pair>,
+    pub(crate) cells: Vec<DirectionPair>,
     /// Mirror and retro-reflection at each viewing angle, where models peak.
-    pub(crate) peaks: Vec<Pair>,
+    pub(crate) peaks: Vec<DirectionPair>,
 }
 
 impl Survey {
     pub(crate) fn new() -> Self {
-        let pair = |theta_i, phi, theta_o| Pair {
+        let pair = |theta_i, phi, theta_o| DirectionPair {
             incident: cartesian(theta_i, phi),
             outgoing: cartesian(theta_o, 0.0),
         };

@@ -11,7 +11,7 @@ use crate::shape::{Ray, SurfacePoint};
 use crate::shelf::Shelf;
 use crate::vector::{BLACK, Frame, Rgb, Vec3, add, largest, scaled, times};
 use crate::world::{Hit, World};
-use elm_datasets::geometry::{Pair, Vector};
+use elm_datasets::geometry::{DirectionPair, Vector};
 
 /// Surfaces after which dim paths may end by chance.
 const ROULETTE_FROM: u32 = 3;
@@ -131,8 +131,8 @@ impl Vertex {
         }
     }
 
-    fn pair(&self, direction: Vec3) -> Pair {
-        Pair {
+    fn pair(&self, direction: Vec3) -> DirectionPair {
+        DirectionPair {
             incident: self.frame.local(&direction),
             outgoing: self.outgoing,
         }
@@ -394,7 +394,7 @@ impl Tracer<'_> {
         };
         Ok(Some(Request {
             material: vertex.material,
-            pair: Pair {
+            pair: DirectionPair {
                 incident,
                 outgoing: vertex.outgoing,
             },

@@ -6,7 +6,7 @@ use ndarray::Array2;
 use super::real::Real;
 use super::{Block, Columns, ROWS};
 use crate::features::Features;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// Fills a block for each input of the set. The same as
 /// [`Features::compute`](crate::features::Features::compute) but for rounding.
@@ -79,7 +79,7 @@ pub(super) fn compute<A: Real>(set: Features, d: &[&[A; ROWS]; 6], x: &mut [Bloc
 }
 
 /// The inputs of each pair of directions, rounded to this precision, shape (pairs, inputs).
-pub(crate) fn inputs_of<A: Real>(set: Features, pairs: &[Pair]) -> Array2<A> {
+pub(crate) fn inputs_of<A: Real>(set: Features, pairs: &[DirectionPair]) -> Array2<A> {
     let columns: Columns<A> = Columns::new(pairs);
     let mut out = Array2::zeros((pairs.len(), set.inputs().len()));
     let mut x = vec![Block::zero(); set.inputs().len()];

@@ -15,12 +15,11 @@
 //! use elm_brdf::batch::{Columns, Packed};
 //! use elm_brdf::model::Tuned;
 //! use elm_datasets::Brdf;
-//! use elm_datasets::geometry::pairs;
 //! use elm_datasets::{Invalid, MaterialId, synthetic};
 //!
 //! let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
 //! let samples = data.samples(0).ok_or("no such material")?;
-//! let pairs = pairs(&samples.directions);
+//! let pairs = &samples.directions;
 //! let tuned = Tuned { neurons: Some(60), ..Tuned::default() };
 //! let model = tuned.fit_model(&pairs, samples.values.view())?;
 //!
@@ -44,7 +43,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::error::{Error, Result};
 pub(crate) use dense::Dense;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 pub(crate) use inputs::inputs_of;
 pub use packed::Packed;
 pub use real::Real;
@@ -76,7 +75,7 @@ pub struct Columns<A> {
 impl<A: Real> Columns<A> {
     /// The components of these pairs.
     #[must_use]
-    pub fn new(pairs: &[Pair]) -> Self {
+    pub fn new(pairs: &[DirectionPair]) -> Self {
         let mut columns = Self {
             components: std::array::from_fn(|_| Vec::new()),
         };
@@ -85,9 +84,9 @@ impl<A: Real> Columns<A> {
     }
 
     /// The components of these pairs in place of what was there, whose room is used again.
-    fn replace(&mut self, pairs: &[Pair]) {
+    fn replace(&mut self, pairs: &[DirectionPair]) {
         for (number, component) in self.components.iter_mut().enumerate() {
-            let of = |pair: &Pair| match number {
+            let of = |pair: &DirectionPair| match number {
                 0..3 => pair.incident[number],
                 _ => pair.outgoing[number - 3],
             };
@@ -154,7 +153,7 @@ pub enum Precision<'a> {
 /// [`Brdf::eval_into`](elm_datasets::Brdf::eval_into) by columns.
 pub(crate) fn eval_pairs<A: Real>(
     model: &dyn Batched<A>,
-    pairs: &[Pair],
+    pairs: &[DirectionPair],
     mut values: ArrayViewMut2<'_, f64>,
 ) -> Result<(), EvalError> {
     let channels = model.channels();

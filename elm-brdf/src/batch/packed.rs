@@ -15,7 +15,7 @@ use crate::features::Features;
 use crate::link::Channel;
 use crate::model::BrdfModel;
 use elm_datasets::Brdf;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// A [`BrdfModel`] packed for [evaluation by columns](crate::batch) in `f32` or `f64`.
 ///
@@ -299,7 +299,7 @@ macro_rules! brdf {
 
             fn eval_into(
                 &self,
-                pairs: &[Pair],
+                pairs: &[DirectionPair],
                 values: ArrayViewMut2<'_, f64>,
             ) -> Result<(), EvalError> {
                 eval_pairs(self, pairs, values)

@@ -12,7 +12,7 @@ use ndarray::Array2;
 use ndarray::Axis;
 
 /// Directions all over the hemisphere, coincident and mirror ones among them.
-fn directions(count: usize) -> Vec<Pair> {
+fn directions(count: usize) -> Vec<DirectionPair> {
     (0..count)
         .map(|number| {
             let i = number as f64;
@@ -23,7 +23,7 @@ fn directions(count: usize) -> Vec<Pair> {
                 1 => [-incident[0], -incident[1], incident[2]],
                 _ => cartesian((0.73 * i) % 1.45, (1.13 * i) % 6.0),
             };
-            Pair { incident, outgoing }
+            DirectionPair { incident, outgoing }
         })
         .collect()
 }
@@ -111,7 +111,7 @@ fn below_the_horizon_and_for_what_is_no_direction_values_are_black_or_finite() {
     let model = model(Features::Algebraic, Link::default_log(), network, 3);
     let packed: Packed<f32> = Packed::new(&model).unwrap();
     let up = [0.0, 0.0, 1.0];
-    let pair = |incident: [f64; 3]| Pair {
+    let pair = |incident: [f64; 3]| DirectionPair {
         incident,
         outgoing: up,
     };

@@ -16,7 +16,7 @@ use crate::protocol::{Folds, MaterialScores, cross_validate, cross_validate_samp
 use crate::reference::Reference;
 use crate::report::plot::{self, Shown};
 use crate::report::{Comparison, Data, Entry, Format, Words};
-use elm_datasets::geometry::{Pair, pairs};
+use elm_datasets::geometry::DirectionPair;
 
 /// Cross-validate every model on the same folds: analytic models, the database's own basis,
 /// interpolators, Gaussian processes, and extreme learning machines.
@@ -195,15 +195,16 @@ impl Subject {
     }
 
     /// The directions of the first material, and its values.
-    fn first(&self) -> Option<(Vec<Pair>, ArrayView2<'_, f64>)> {
+    fn first(&self) -> Option<(Vec<DirectionPair>, ArrayView2<'_, f64>)> {
         match self {
             Self::Materials(_, data) => {
                 let material = data.materials.first()?;
-                let directions = &data.samples(0)?.directions;
-                Some((pairs(directions), material.values.view()))
+                let all = &data.directions;
+                let rows = material.rows.iter().map(|&row| all.get(row).copied());
+                Some((rows.collect::<Option<_>>()?, material.values.view()))
             }
             Self::Samples(material) => Some((
-                pairs(&material.samples.directions),
+                material.samples.directions.clone(),
                 material.samples.values.view(),
             )),
         }

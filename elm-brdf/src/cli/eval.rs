@@ -13,7 +13,6 @@ use crate::file;
 use crate::metrics::Metrics;
 use crate::model::BrdfModel;
 use elm_datasets::Brdf;
-use elm_datasets::geometry::pairs;
 
 /// Judge a saved model by measurements.
 #[derive(Debug, Args)]
@@ -93,7 +92,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         ..
     } = material;
     let samples = model.matched(samples)?;
-    let pairs = pairs(&samples.directions);
+    let pairs = &samples.directions;
     let predicted = model.eval(&pairs).map_err(Error::from)?;
     let evaluation = Evaluation {
         rows: pairs.len(),

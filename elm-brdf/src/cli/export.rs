@@ -13,7 +13,6 @@ use crate::file;
 use crate::model::BrdfModel;
 use crate::recipes;
 use crate::scene_materials::MaterialTable;
-use elm_datasets::geometry::pairs;
 
 /// Write a model as source code or as a table, for other programs.
 ///
@@ -53,7 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let brdf = match arguments.model.strip_prefix("csv:") {
         Some(file) => {
             let samples = reading.read(file)?.samples.in_rgb_order();
-            let pairs = pairs(&samples.directions);
+            let pairs = &samples.directions;
             recipes::network(None).fit(&pairs, samples.values.view())?
         }
         None => {

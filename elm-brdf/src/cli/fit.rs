@@ -16,7 +16,6 @@ use crate::metrics::Metric;
 use crate::model::{BrdfModel, Tuned};
 use crate::prior::Prior;
 use crate::quality;
-use elm_datasets::geometry::pairs;
 
 /// Fit a network to measurements and save it as one file.
 ///
@@ -74,7 +73,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         None => None,
     };
     let start = Instant::now();
-    let pairs = pairs(&samples.directions);
+    let pairs = &samples.directions;
     let values = samples.values.view();
     let model = match prior {
         Some(prior) => prior.fit_model(&pairs, values)?,

@@ -14,7 +14,6 @@ use crate::gallery::{self, Exhibit};
 use crate::model::BrdfModel;
 use crate::protocol::{Folds, cross_validate};
 use crate::recipes;
-use elm_datasets::geometry::pairs;
 
 /// Write a page that shows learnt materials: spheres, lobes, errors, sizes, and a sphere to play
 /// with, shaded by the networks in the browser.
@@ -57,7 +56,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let Some(samples) = data.samples(index) else {
             continue;
         };
-        let brdf = network.fit(&pairs(&samples.directions), samples.values.view())?;
+        let brdf = network.fit(&samples.directions, samples.values.view())?;
         let model = BrdfModel::of(&*brdf).ok_or(Error::Export(ExportError::NoNetwork))?;
         let squares = score.channels.iter().map(|c| c.held_out.rmse.powi(2));
         exhibits.push(Exhibit {

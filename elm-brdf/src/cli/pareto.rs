@@ -16,7 +16,6 @@ use crate::pareto::{self, Given, Point, Problem};
 use crate::protocol::Folds;
 use crate::reference::Nbrdf;
 use crate::report::plot;
-use elm_datasets::geometry::pairs;
 
 /// Weigh run time against error: for every model that can be fitted, the held-out error, the time to
 /// fit, the time of an evaluation, and the numbers stored; and which models no other beats.
@@ -195,10 +194,7 @@ fn of_samples(arguments: &Arguments, name: &str, test: Option<&str>) -> Result<S
     let mut material = arguments.reading.read(name)?;
     // As published weights have them.
     material.samples = material.samples.in_rgb_order();
-    let (all, values) = (
-        pairs(&material.samples.directions),
-        material.samples.values.view(),
-    );
+    let (all, values) = (&material.samples.directions, material.samples.values.view());
     let test = test.map(str::to_owned).or_else(|| test_beside(name));
     let (problem, how) = match &test {
         Some(test) => {
@@ -211,9 +207,9 @@ fn of_samples(arguments: &Arguments, name: &str, test: Option<&str>) -> Result<S
                     samples: judges.samples.channels.join(", "),
                 })?;
             let problem = Problem {
-                train: all,
+                train: all.clone(),
                 train_values: values.to_owned(),
-                test: pairs(&judges.directions),
+                test: judges.directions,
                 test_values: judges.values,
             };
             (problem, format!("judged on {test}"))
@@ -271,7 +267,7 @@ fn of_materials(arguments: &Arguments) -> Result<Subject, Failure> {
         let Some(samples) = data.samples(index) else {
             continue;
         };
-        let pairs = pairs(&samples.directions);
+        let pairs = &samples.directions;
         let folds = Folds::new(pairs.len(), arguments.folds, arguments.seed).map_err(usage)?;
         problems.extend((0..arguments.folds).map(|fold| {
             Problem::split(&pairs, samples.values.view(), |row| {

@@ -12,7 +12,6 @@ use super::data::Source;
 use super::{Failure, overwrite, print};
 use crate::error::Error;
 use crate::prior::PriorParams;
-use elm_datasets::geometry::pairs;
 
 /// What other materials teach about a new one.
 #[derive(Debug, Args)]
@@ -92,7 +91,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         about.push_str(&format!(", without {}", names.join(", ")));
     }
     let prior = params
-        .build(&pairs(&data.directions), values.view())?
+        .build(&data.directions, values.view())?
         .with_source(about);
     persist::save(&prior, &build.output).map_err(Error::from)?;
     print(&format!(

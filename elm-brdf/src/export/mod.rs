@@ -24,7 +24,7 @@
 //!     link: Link::default_log(),
 //!     network: ElmParams::new(40).activation(Activation::Sine).solver(Ridge::leave_one_out()),
 //! };
-//! let model = params.fit_model(&pairs(&samples.directions), samples.values.view())?;
+//! let model = params.fit_model(&samples.directions, samples.values.view())?;
 //! let shader = source(&model, Language::Glsl, "felt")?;
 //! assert!(shader.contains("vec3 felt_eval(vec3 light, vec3 viewer)"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -41,7 +41,6 @@ mod write;
 use std::path::Path;
 use std::str::FromStr;
 
-use elm_datasets::Directions;
 use elm_datasets::merl::Merl;
 
 pub use dialect::Language;
@@ -52,7 +51,7 @@ pub use write::{header, source};
 use crate::error::{Error, Result};
 use crate::model::BrdfModel;
 use elm_datasets::Brdf;
-use elm_datasets::geometry::{Pair, pairs};
+use elm_datasets::geometry::DirectionPair;
 
 /// What a model can be exported to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -152,7 +151,7 @@ pub fn merl_table(brdf: &dyn Brdf) -> Result<(Merl, f64)> {
     }
     // The table asks for one pair at a time, and a network answers many at once far faster: the
     // first pass takes the questions down, the second gives the answers in the same order.
-    let mut asked: Vec<Directions> = Vec::new();
+    let mut asked: Vec<DirectionPair> = Vec::new();
     Merl::from_fn(|directions| {
         asked.push(*directions);
         [0.0; 3]
@@ -160,13 +159,12 @@ pub fn merl_table(brdf: &dyn Brdf) -> Result<(Merl, f64)> {
     let known = BrdfModel::of(brdf).is_some_and(|m| m.features().is_reciprocal());
     let mut answers = Vec::with_capacity(asked.len());
     let (mut differences, mut squares) = (0.0, 0.0);
-    for block in asked.chunks(BLOCK) {
-        let pairs = pairs(block);
-        let values = brdf.eval(&pairs)?;
+    for pairs in asked.chunks(BLOCK) {
+        let values = brdf.eval(pairs)?;
         let exchanged = if known {
             None
         } else {
-            let swapped: Vec<Pair> = pairs.iter().map(|pair| pair.swapped()).collect();
+            let swapped: Vec<DirectionPair> = pairs.iter().map(|pair| pair.swapped()).collect();
             Some(brdf.eval(&swapped)?)
         };
         for row in 0..pairs.len() {

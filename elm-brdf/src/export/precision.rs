@@ -1,7 +1,7 @@
 //! What single precision costs a model: output weights that nearly cancel magnify every rounding.
 
 use elm::Activation;
-use elm_datasets::Directions;
+use elm_datasets::Angles;
 use ndarray::{Array2, Zip};
 
 use super::error::ExportError;
@@ -10,7 +10,7 @@ use crate::batch;
 use crate::error::{Error, Result};
 use crate::model::BrdfModel;
 use elm_datasets::Brdf;
-use elm_datasets::geometry::{Pair, pairs};
+use elm_datasets::geometry::DirectionPair;
 
 /// The error of evaluating a model in `f32` in place of `f64`, over directions all over the
 /// hemisphere, near the mirror direction and back towards the light. In 1/sr, over all channels.
@@ -91,7 +91,7 @@ impl BrdfModel {
     /// errors of values.
     fn errors(
         &self,
-        pairs: &[Pair],
+        pairs: &[DirectionPair],
         exact: &Array2<f64>,
         single: &Array2<f64>,
         spread: &Array2<f64>,
@@ -223,7 +223,7 @@ fn neurons(neurons: &[Neuron], functions: &[Activation<f32>], x: &[f32]) -> Vec<
 /// over both polar angles and the azimuth between them (M. Roberts's R3: powers of the inverse of
 /// the root of x^4 = x + 1), and an eighth of the pairs each about the mirror direction and about
 /// the light.
-fn survey() -> Vec<Pair> {
+fn survey() -> Vec<DirectionPair> {
     const COUNT: u32 = 2048;
     const STEPS: [f64; 3] = [
         0.819_172_513_396_164_4,
@@ -244,12 +244,12 @@ fn survey() -> Vec<Pair> {
             1 => (near, turned),
             _ => (MOST * u[1], std::f64::consts::TAU * u[2]),
         };
-        Directions {
+        DirectionPair::from(Angles {
             theta_i,
             phi_i: 0.0,
             theta_o: theta_o.clamp(0.0, MOST),
             phi_o,
-        }
+        })
     };
-    pairs(&(1..=COUNT).map(at).collect::<Vec<_>>())
+    (1..=COUNT).map(at).collect()
 }

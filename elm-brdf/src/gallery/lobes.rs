@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use crate::error::Result;
 use elm_datasets::Brdf;
-use elm_datasets::geometry::{Pair, cartesian};
+use elm_datasets::geometry::{DirectionPair, cartesian};
 
 /// Angles of the light in degrees, with the colour of each lobe.
 const LIGHTS: [(f64, &str); 3] = [(10.0, "#7fb4d8"), (40.0, "#e6a857"), (70.0, "#d97a7a")];
@@ -19,9 +19,9 @@ pub(super) fn draw(brdf: &dyn Brdf) -> Result<String> {
     let degrees: Vec<f64> = (-178..=178).map(|half| f64::from(half) / 2.0).collect();
     let mut lobes = Vec::new();
     for (light, colour) in LIGHTS {
-        let pairs: Vec<Pair> = degrees
+        let pairs: Vec<DirectionPair> = degrees
             .iter()
-            .map(|viewer| Pair {
+            .map(|viewer| DirectionPair {
                 incident: cartesian(light.to_radians(), PI),
                 outgoing: cartesian(
                     viewer.abs().to_radians(),

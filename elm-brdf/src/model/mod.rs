@@ -31,7 +31,7 @@ use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
 use elm_datasets::Brdf;
 use elm_datasets::brdf::check_directions;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 pub use layer::{Draw, Layer};
 pub use scaled_once::ScaledOnce;
 pub use tuned::{Lean, SideBySide, Tuned};
@@ -51,12 +51,12 @@ pub struct BrdfParams {
 ///
 /// ```
 /// use elm_brdf::{fit::Fit, model::BrdfParams};
-/// use elm_datasets::{Brdf, geometry::pairs};
+/// use elm_datasets::Brdf;
 /// use elm_datasets::{Invalid, MaterialId, synthetic};
 ///
 /// let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
 /// let samples = data.samples(0).ok_or("no such material")?;
-/// let pairs = pairs(&samples.directions);
+/// let pairs = &samples.directions;
 /// let model = BrdfParams::paper(50).fit(&pairs, samples.values.view())?;
 /// assert_eq!(model.eval(&pairs)?.dim(), (205, 3));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -206,7 +206,11 @@ impl BrdfParams {
     ///
     /// # Errors
     /// Where these measurements cannot be fitted.
-    pub fn fit_model(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<BrdfModel> {
+    pub fn fit_model(
+        &self,
+        pairs: &[DirectionPair],
+        values: ArrayView2<'_, f64>,
+    ) -> Result<BrdfModel> {
         check(pairs, values)?;
         let x = self.features.compute_training(pairs);
         let link = self.link.fit(values)?;
@@ -221,13 +225,13 @@ impl BrdfParams {
 impl Fit for BrdfParams {
     type Model = BrdfModel;
 
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+    fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         self.fit_model(pairs, values)
     }
 }
 
 impl BrdfModel {
-    fn values_at(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
+    fn values_at(&self, pairs: &[DirectionPair]) -> Result<Array2<f64>> {
         check_directions(pairs)?;
         let targets = self.network.predict(&self.features.compute(pairs))?;
         let mut values = self.link.to_values(targets)?;
@@ -245,7 +249,11 @@ impl Brdf for BrdfModel {
         self.network.outputs()
     }
 
-    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+    fn eval_into(
+        &self,
+        pairs: &[DirectionPair],
+        values: ArrayViewMut2<'_, f64>,
+    ) -> Result<(), EvalError> {
         assign(self.values_at(pairs)?, values)
     }
 }

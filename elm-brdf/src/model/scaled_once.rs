@@ -6,7 +6,7 @@ use super::{BrdfModel, BrdfParams};
 use crate::error::{Error, Result};
 use crate::fit::Fit;
 use crate::link::Link;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// [`BrdfParams`] that are cross-validated with their inputs standardised once, on all
 /// measurements, so that all folds come from one factorisation, in closed form.
@@ -36,13 +36,13 @@ impl ScaledOnce {
 impl Fit for ScaledOnce {
     type Model = BrdfModel;
 
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+    fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         self.0.fit(pairs, values)
     }
 
     fn cross_fits(
         &self,
-        pairs: &[Pair],
+        pairs: &[DirectionPair],
         values: ArrayView2<'_, f64>,
         folds: &[usize],
         count: usize,

@@ -23,7 +23,7 @@ use crate::fit::{Fit, Model, check};
 use crate::metrics::Metric;
 use crate::quality;
 use elm_datasets::Brdf;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 use finish::Finished;
 pub use lean::Lean;
 use problem::Problem;
@@ -72,12 +72,11 @@ use problem::Problem;
 ///
 /// ```
 /// use elm_brdf::{fit::Model, model::Tuned};
-/// use elm_datasets::geometry::pairs;
 /// use elm_datasets::{Invalid, MaterialId, synthetic};
 ///
 /// let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
 /// let samples = data.samples(0).ok_or("no such material")?;
-/// let pairs = pairs(&samples.directions);
+/// let pairs = &samples.directions;
 /// let tuned = Tuned { neurons: Some(60), ..Tuned::default() };
 /// let model = tuned.fit_model(&pairs, samples.values.view())?;
 /// assert_eq!(model.network().hidden().neurons(), 60);
@@ -122,7 +121,11 @@ impl Tuned {
     ///
     /// # Errors
     /// Where these measurements cannot be fitted, or `max_floats` leaves no neuron.
-    pub fn fit_model(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<BrdfModel> {
+    pub fn fit_model(
+        &self,
+        pairs: &[DirectionPair],
+        values: ArrayView2<'_, f64>,
+    ) -> Result<BrdfModel> {
         check(pairs, values)?;
         let all: Vec<usize> = (0..values.ncols()).collect();
         if pairs.len() > Self::MANY {
@@ -228,7 +231,7 @@ impl Tuned {
 impl Fit for Tuned {
     type Model = SideBySide;
 
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+    fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         check(pairs, values)?;
         let each: Vec<Vec<usize>> = (0..values.ncols()).map(|channel| vec![channel]).collect();
         let models = if pairs.len() > Self::MANY {
@@ -252,7 +255,7 @@ impl Brdf for SideBySide {
 
     fn eval_into(
         &self,
-        pairs: &[Pair],
+        pairs: &[DirectionPair],
         mut values: ArrayViewMut2<'_, f64>,
     ) -> Result<(), EvalError> {
         check_arguments(pairs, &values, self.channels())?;
@@ -378,7 +381,7 @@ fn model_of(problem: &Problem<'_>, finished: Finished) -> Result<BrdfModel> {
 fn provenance(
     seed: u64,
     metric: Metric,
-    pairs: &[Pair],
+    pairs: &[DirectionPair],
     values: ArrayView2<'_, f64>,
 ) -> Provenance {
     let exchanged = quality::exchanged(pairs);

@@ -8,7 +8,7 @@ use crate::batch::{Batched, Columns, Packed, Precision, Real};
 use crate::error::Result;
 use crate::fit::Model;
 use crate::reference::Nbrdf;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// Pairs in a batch: its directions and values stay in the second-level cache.
 const BATCH: usize = 4096;
@@ -21,12 +21,12 @@ const TURN: f64 = 1e-3;
 enum Timed<'a> {
     Single(&'a dyn Batched<f32>, Columns<f32>, Vec<f32>),
     Double(&'a dyn Batched<f64>, Columns<f64>, Vec<f64>),
-    General(&'a dyn Model, Vec<Pair>),
+    General(&'a dyn Model, Vec<DirectionPair>),
 }
 
 /// The median time of an evaluation for each model, in nanoseconds.
-pub(super) fn take_turns(models: &[Box<dyn Model>], pairs: &[Pair]) -> Result<Vec<f64>> {
-    let batch: Vec<Pair> = pairs.iter().copied().cycle().take(BATCH).collect();
+pub(super) fn take_turns(models: &[Box<dyn Model>], pairs: &[DirectionPair]) -> Result<Vec<f64>> {
+    let batch: Vec<DirectionPair> = pairs.iter().copied().cycle().take(BATCH).collect();
     // Of each the passes in a turn and the nanoseconds so far.
     let mut all = Vec::with_capacity(models.len());
     for model in models {
@@ -65,8 +65,8 @@ fn by_columns(model: &dyn Model) -> Option<Precision<'_>> {
 }
 
 impl<'a> Timed<'a> {
-    fn new(model: &'a dyn Model, batch: &[Pair]) -> Self {
-        fn room<A: Real>(model: &dyn Batched<A>, batch: &[Pair]) -> (Columns<A>, Vec<A>) {
+    fn new(model: &'a dyn Model, batch: &[DirectionPair]) -> Self {
+        fn room<A: Real>(model: &dyn Batched<A>, batch: &[DirectionPair]) -> (Columns<A>, Vec<A>) {
             let values = vec![A::zero(); batch.len() * model.channels()];
             (Columns::new(batch), values)
         }

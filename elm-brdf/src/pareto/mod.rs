@@ -23,17 +23,17 @@ use crate::error::Result;
 use crate::fit::Model;
 use crate::metrics::{Metric, Metrics};
 use crate::model::BrdfModel;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// Measurements to fit to, and others of the same material that judge.
 #[derive(Debug, Clone)]
 pub struct Problem {
     /// Directions that are fitted to.
-    pub train: Vec<Pair>,
+    pub train: Vec<DirectionPair>,
     /// BRDF in 1/sr at those, shape (pairs, channels).
     pub train_values: Array2<f64>,
     /// Directions that judge.
-    pub test: Vec<Pair>,
+    pub test: Vec<DirectionPair>,
     /// BRDF in 1/sr at those.
     pub test_values: Array2<f64>,
 }
@@ -42,7 +42,7 @@ impl Problem {
     /// Holds out the rows that `is_held_out` says.
     #[must_use]
     pub fn split(
-        pairs: &[Pair],
+        pairs: &[DirectionPair],
         values: ArrayView2<'_, f64>,
         is_held_out: impl Fn(usize) -> bool,
     ) -> Self {
@@ -253,8 +253,8 @@ mod tests {
 
     #[test]
     fn a_split_puts_every_row_on_one_side() {
-        let pairs: Vec<Pair> = (0..10)
-            .map(|k| Pair {
+        let pairs: Vec<DirectionPair> = (0..10)
+            .map(|k| DirectionPair {
                 incident: [f64::from(k), 0.0, 1.0],
                 outgoing: [0.0, 0.0, 1.0],
             })

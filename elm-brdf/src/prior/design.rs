@@ -5,7 +5,7 @@ use ndarray::{Array1, Axis, Zip};
 use super::Prior;
 use crate::error::{Error, Result};
 use elm_datasets::brdf::check_directions;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// The variance that no measurement explains, relative to the prior's mean variance.
 const NOISE: f64 = 0.01;
@@ -25,13 +25,12 @@ impl Prior {
     ///
     /// ```
     /// use elm_brdf::prior::PriorParams;
-    /// use elm_datasets::geometry::pairs;
     /// use elm_datasets::{Invalid, MaterialId, synthetic};
     /// use ndarray::Array2;
     ///
     /// let ids: Vec<MaterialId> = MaterialId::all().take(12).collect();
     /// let data = synthetic::measurements(1, &ids, Invalid::Clamp);
-    /// let pairs = pairs(&data.directions);
+    /// let pairs = &data.directions;
     /// let values = Array2::from_shape_fn((205, 12), |(row, m)| data.materials[m].values[[row, 0]]);
     /// let prior = PriorParams::default().build(&pairs, values.view())?;
     /// let first = prior.design(&pairs, 20)?;
@@ -41,7 +40,7 @@ impl Prior {
     ///
     /// # Errors
     /// [`Error::Parameter`] for more than there are pairs; directions that are none.
-    pub fn design(&self, pairs: &[Pair], count: usize) -> Result<Vec<usize>> {
+    pub fn design(&self, pairs: &[DirectionPair], count: usize) -> Result<Vec<usize>> {
         check_directions(pairs)?;
         if count > pairs.len() {
             return Err(Error::Parameter {
@@ -98,13 +97,12 @@ mod tests {
     use ndarray::Array2;
 
     use crate::prior::PriorParams;
-    use elm_datasets::geometry::pairs;
 
     #[test]
     fn a_design_repeats_no_direction_and_begins_like_a_shorter_one() {
         let ids: Vec<MaterialId> = MaterialId::all().take(6).collect();
         let data = synthetic::measurements(1, &ids, Invalid::Clamp);
-        let pairs = pairs(&data.directions);
+        let pairs = &data.directions;
         let values = Array2::from_shape_fn((205, 6), |(row, m)| data.materials[m].values[[row, 0]]);
         let params = PriorParams {
             neurons: 60,

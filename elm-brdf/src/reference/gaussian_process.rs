@@ -11,7 +11,7 @@ use crate::fit::{Fit, Model, assign};
 use crate::link::Link;
 use crate::scales::spread;
 use elm_datasets::Brdf;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// Correlation of the process at a distance $r$ in units of the length scales.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -122,7 +122,7 @@ fn kernel(covariance: Covariance, a: &Array2<f64>, b: &Array2<f64>) -> Array2<f6
 impl Fit for GaussianProcess {
     type Model = GaussianProcessModel;
 
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+    fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         if self.candidates == 0 {
             return Err(Error::Parameter {
                 name: "candidates",
@@ -189,7 +189,7 @@ impl Fit for GaussianProcess {
 }
 
 impl GaussianProcessModel {
-    fn values_at(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
+    fn values_at(&self, pairs: &[DirectionPair]) -> Result<Array2<f64>> {
         let x = self.frame.points(pairs)?;
         let mut targets = Array2::zeros((pairs.len(), self.channels()));
         for process in &self.processes {
@@ -209,7 +209,11 @@ impl Brdf for GaussianProcessModel {
         self.frame.channels()
     }
 
-    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+    fn eval_into(
+        &self,
+        pairs: &[DirectionPair],
+        values: ArrayViewMut2<'_, f64>,
+    ) -> Result<(), EvalError> {
         assign(self.values_at(pairs)?, values)
     }
 }

@@ -8,7 +8,7 @@ use crate::features::Features;
 use crate::fit::check;
 use crate::link::{FittedLink, Link};
 use elm_datasets::brdf::check_directions;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// From directions to points in a space where distance means something, and from predicted
 /// targets to reflectance.
@@ -24,7 +24,7 @@ impl Frame {
     pub(super) fn fit(
         features: Features,
         link: Link,
-        pairs: &[Pair],
+        pairs: &[DirectionPair],
         values: ArrayView2<'_, f64>,
     ) -> Result<(Self, Array2<f64>, Array2<f64>)> {
         check(pairs, values)?;
@@ -48,13 +48,17 @@ impl Frame {
     ///
     /// # Errors
     /// For a direction that is not finite.
-    pub(super) fn points(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
+    pub(super) fn points(&self, pairs: &[DirectionPair]) -> Result<Array2<f64>> {
         check_directions(pairs)?;
         Ok(self.standardise(self.features.compute(pairs)))
     }
 
     /// Reflectance for predicted targets: not negative, and black below the horizon.
-    pub(super) fn values(&self, pairs: &[Pair], targets: Array2<f64>) -> Result<Array2<f64>> {
+    pub(super) fn values(
+        &self,
+        pairs: &[DirectionPair],
+        targets: Array2<f64>,
+    ) -> Result<Array2<f64>> {
         let mut values = self.link.to_values(targets)?;
         for (mut row, pair) in values.rows_mut().into_iter().zip(pairs) {
             let above = pair.is_above_horizon();

@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::fit::{Fit, Model, assign, check};
 use elm_datasets::Brdf;
 use elm_datasets::brdf::check_directions;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// A linear combination of the isotropic and reciprocal functions that Zernike's polynomials
 /// $R_n^l$ give on pairs of hemispheres,
@@ -60,7 +60,7 @@ impl Modes {
     }
 
     /// The modes' values, shape (pairs, modes); 0 below the horizon.
-    fn design(&self, pairs: &[Pair]) -> Array2<f64> {
+    fn design(&self, pairs: &[DirectionPair]) -> Array2<f64> {
         let mut design = Array2::zeros((pairs.len(), self.indices.len()));
         for (mut row, pair) in design.rows_mut().into_iter().zip(pairs) {
             if !pair.is_above_horizon() {
@@ -114,7 +114,7 @@ impl Modes {
 impl Fit for Koenderink {
     type Model = KoenderinkModel;
 
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+    fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         check(pairs, values)?;
         let modes = Modes::new(self.order);
         let design = modes.design(pairs);
@@ -128,7 +128,7 @@ impl Fit for Koenderink {
 }
 
 impl KoenderinkModel {
-    fn values_at(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
+    fn values_at(&self, pairs: &[DirectionPair]) -> Result<Array2<f64>> {
         check_directions(pairs)?;
         let values = self.modes.design(pairs).dot(&self.coefficients);
         Ok(values.mapv_into(|value| value.max(0.0)))
@@ -140,7 +140,11 @@ impl Brdf for KoenderinkModel {
         self.coefficients.ncols()
     }
 
-    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+    fn eval_into(
+        &self,
+        pairs: &[DirectionPair],
+        values: ArrayViewMut2<'_, f64>,
+    ) -> Result<(), EvalError> {
         assign(self.values_at(pairs)?, values)
     }
 }
@@ -214,10 +218,10 @@ mod tests {
 
     #[test]
     fn a_combination_of_modes_is_found_again_and_is_reciprocal() {
-        let pairs: Vec<Pair> = (0..60)
+        let pairs: Vec<DirectionPair> = (0..60)
             .map(|i| {
                 let i = f64::from(i);
-                Pair {
+                DirectionPair {
                     incident: cartesian((0.37 * i) % 1.5, 0.0),
                     outgoing: cartesian((0.73 * i) % 1.5, (1.13 * i) % 6.0),
                 }
@@ -232,7 +236,7 @@ mod tests {
         };
         let model = koenderink.fit(&pairs, values.view()).unwrap();
         assert_abs_diff_eq!(model.eval(&pairs).unwrap(), values, epsilon = 1e-12);
-        let swapped: Vec<Pair> = pairs.iter().map(|pair| pair.swapped()).collect();
+        let swapped: Vec<DirectionPair> = pairs.iter().map(|pair| pair.swapped()).collect();
         assert_abs_diff_eq!(model.eval(&swapped).unwrap(), values, epsilon = 1e-12);
     }
 }

@@ -11,7 +11,7 @@ use pulp::Simd;
 use crate::batch::{Batched, Block, Columns, Dense, Kernel, ROWS, Real, eval_pairs, run};
 use crate::error::{Error, Result};
 use elm_datasets::Brdf;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// Neurons of each of its two hidden layers.
 const NEURONS: usize = 21;
@@ -206,7 +206,11 @@ impl Brdf for Nbrdf {
         CHANNELS
     }
 
-    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+    fn eval_into(
+        &self,
+        pairs: &[DirectionPair],
+        values: ArrayViewMut2<'_, f64>,
+    ) -> Result<(), EvalError> {
         eval_pairs(self, pairs, values)
     }
 }

@@ -9,7 +9,7 @@ use crate::features::Features;
 use crate::fit::{Fit, Model, assign};
 use crate::link::Link;
 use elm_datasets::Brdf;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// The mean of the targets at the nearest nodes, each weighted by $r^{-p}$ of its distance $r$
 /// over standardised inputs; at a node itself its own target.
@@ -59,7 +59,7 @@ impl Neighbours {
 impl Fit for Neighbours {
     type Model = NeighboursModel;
 
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+    fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         if self.count == 0 {
             return Err(Error::Parameter {
                 name: "number of neighbours",
@@ -148,7 +148,7 @@ fn weighted(near: &[(usize, f64)], targets: &Array2<f64>, power: i32) -> Array1<
 }
 
 impl NeighboursModel {
-    fn values_at(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
+    fn values_at(&self, pairs: &[DirectionPair]) -> Result<Array2<f64>> {
         let points = self.frame.points(pairs)?;
         let mut targets = Array2::zeros((pairs.len(), self.channels()));
         for (row, mut out) in targets.rows_mut().into_iter().enumerate() {
@@ -173,7 +173,11 @@ impl Brdf for NeighboursModel {
         self.frame.channels()
     }
 
-    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+    fn eval_into(
+        &self,
+        pairs: &[DirectionPair],
+        values: ArrayViewMut2<'_, f64>,
+    ) -> Result<(), EvalError> {
         assign(self.values_at(pairs)?, values)
     }
 }

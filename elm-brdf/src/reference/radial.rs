@@ -10,7 +10,7 @@ use crate::features::Features;
 use crate::fit::{Fit, Model, assign};
 use crate::link::Link;
 use elm_datasets::Brdf;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// A radial basis function of the distance $r$.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -89,7 +89,7 @@ fn polynomial(x: &Array2<f64>, terms: usize) -> Array2<f64> {
 impl Fit for RadialBasis {
     type Model = RadialBasisModel;
 
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+    fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         let (frame, x, targets) = Frame::fit(self.features, self.link, pairs, values)?;
         let (nodes, targets) = match self.smoothing {
             Smoothing::Exact => join_duplicates(&x, &targets),
@@ -137,7 +137,7 @@ fn leave_one_out(projected: &Projected, targets: ArrayView2<'_, f64>) -> Vec<f64
 }
 
 impl RadialBasisModel {
-    fn values_at(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
+    fn values_at(&self, pairs: &[DirectionPair]) -> Result<Array2<f64>> {
         let x = self.frame.points(pairs)?;
         let kernel = squared_distances(&x, &self.nodes).mapv(|d| self.radial.of_squared(d));
         let tail = polynomial(&x, self.weights.tail.nrows()).dot(&self.weights.tail);
@@ -151,7 +151,11 @@ impl Brdf for RadialBasisModel {
         self.frame.channels()
     }
 
-    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+    fn eval_into(
+        &self,
+        pairs: &[DirectionPair],
+        values: ArrayViewMut2<'_, f64>,
+    ) -> Result<(), EvalError> {
         assign(self.values_at(pairs)?, values)
     }
 }

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::fit::Fit;
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use elm_datasets::Brdf;
-use elm_datasets::geometry::{Pair, cartesian};
+use elm_datasets::geometry::{DirectionPair, cartesian};
 use elm_datasets::lobes::{self, Cosines};
 use ndarray::{Array2, Axis, array};
 use std::f64::consts::{FRAC_PI_4, PI};
@@ -17,19 +17,19 @@ fn all() -> Vec<Reference> {
 }
 
 /// Directions all over the hemisphere, with mirror reflection and its neighbourhood among them.
-fn directions(count: usize) -> Vec<Pair> {
+fn directions(count: usize) -> Vec<DirectionPair> {
     (0..count)
         .map(|number| {
             let i = number as f64;
             let theta_i = (0.37 * i) % 1.4;
             if number % 3 == 0 {
                 let (near, aside) = ((0.11 * i) % 0.3, (0.23 * i) % 0.4);
-                Pair {
+                DirectionPair {
                     incident: cartesian(theta_i, 0.1 * i),
                     outgoing: cartesian((theta_i + near).min(1.4), 0.1 * i + PI - aside),
                 }
             } else {
-                Pair {
+                DirectionPair {
                     incident: cartesian(theta_i, 0.0),
                     outgoing: cartesian((0.73 * i) % 1.4, (1.13 * i) % 6.0),
                 }
@@ -38,8 +38,8 @@ fn directions(count: usize) -> Vec<Pair> {
         .collect()
 }
 
-fn measured(pairs: &[Pair], model: impl Fn(&Cosines) -> f64) -> Array2<f64> {
-    let value = |pair: &Pair| {
+fn measured(pairs: &[DirectionPair], model: impl Fn(&Cosines) -> f64) -> Array2<f64> {
+    let value = |pair: &DirectionPair| {
         Cosines::of_vectors(pair.incident, pair.outgoing).map_or(0.0, |angles| model(&angles))
     };
     Array2::from_shape_fn((pairs.len(), 1), |(row, _)| value(&pairs[row]))
@@ -167,13 +167,13 @@ fn analytic_models_agree_with_the_formulas_of_the_data_crate() {
     let pairs = directions(50);
     let values = measured(&pairs, |a| 0.1 + 0.05 * a.phong(8.0));
     let model = Analytic::Phong.fit(&pairs, values.view()).unwrap();
-    let other = elm_datasets::Directions {
+    let other = DirectionPair::from(elm_datasets::Angles {
         theta_i: 0.4,
         phi_i: 0.0,
         theta_o: 0.7,
         phi_o: 3.0,
-    };
-    let value = model.eval(&[Pair::from(&other)]).unwrap();
+    });
+    let value = model.eval(&[other]).unwrap();
     let expected = lobes::phong(&other, 0.1, 0.05, 8.0);
     assert_relative_eq!(value[[0, 0]], expected, max_relative = 1e-8);
 }
@@ -225,7 +225,7 @@ fn models_of_reciprocal_inputs_are_reciprocal() {
     let pairs = directions(60);
     // Not reciprocal itself.
     let values = measured(&pairs, |a| 0.1 + 0.2 * a.phong(5.0));
-    let swapped: Vec<Pair> = pairs.iter().map(|pair| pair.swapped()).collect();
+    let swapped: Vec<DirectionPair> = pairs.iter().map(|pair| pair.swapped()).collect();
     for reference in all() {
         let reciprocal = match reference.features {
             Some(features) => features.is_reciprocal(),
@@ -248,10 +248,10 @@ fn models_of_reciprocal_inputs_are_reciprocal() {
 #[test]
 fn nothing_is_negative_or_not_finite_whatever_the_measurements() {
     let pairs = directions(60);
-    let doubled: Vec<Pair> = pairs[..20].iter().chain(&pairs[..20]).copied().collect();
+    let doubled: Vec<DirectionPair> = pairs[..20].iter().chain(&pairs[..20]).copied().collect();
     let contradicting = Array2::from_shape_fn((40, 1), |(row, _)| 0.01 * row as f64);
     let metallic = measured(&pairs, |a| 1e-5 + 600.0 * (a.ward(0.05) / 32.0).min(1.0));
-    let table: [(&str, Vec<Pair>, Array2<f64>); 8] = [
+    let table: [(&str, Vec<DirectionPair>, Array2<f64>); 8] = [
         ("black", pairs.clone(), Array2::zeros((60, 2))),
         ("grey", pairs.clone(), Array2::from_elem((60, 1), 0.2)),
         ("one row", pairs[..1].to_vec(), array![[0.3]]),
@@ -269,14 +269,14 @@ fn nothing_is_negative_or_not_finite_whatever_the_measurements() {
         ("rows twice, other values", doubled, contradicting),
         ("metallic", pairs.clone(), metallic),
     ];
-    let everywhere: Vec<Pair> = directions(200)
+    let everywhere: Vec<DirectionPair> = directions(200)
         .into_iter()
         .chain([
-            Pair {
+            DirectionPair {
                 incident: [1.0, 0.0, 1e-12],
                 outgoing: [-1.0, 0.0, 1e-12],
             },
-            Pair {
+            DirectionPair {
                 incident: [0.0, 0.0, 1.0],
                 outgoing: [0.0, 0.0, 1.0],
             },
@@ -301,10 +301,10 @@ fn there_is_no_reflection_at_or_below_the_horizon() {
     let pairs = directions(60);
     let values = measured(&pairs, glossy);
     let up = cartesian(0.3, 0.0);
-    let below: Vec<Pair> = [[1.0, 0.0, 0.0], [0.6, 0.0, -0.8]]
+    let below: Vec<DirectionPair> = [[1.0, 0.0, 0.0], [0.6, 0.0, -0.8]]
         .iter()
         .flat_map(|&down| {
-            let pair = Pair {
+            let pair = DirectionPair {
                 incident: up,
                 outgoing: down,
             };
@@ -327,8 +327,9 @@ fn bad_measurements_are_refused_by_name() {
     let mut lost = pairs.clone();
     lost[4].outgoing[0] = f64::INFINITY;
     for reference in all() {
-        let fit =
-            |pairs: &[Pair], values: &Array2<f64>| reference.method.fit(pairs, values.view()).err();
+        let fit = |pairs: &[DirectionPair], values: &Array2<f64>| {
+            reference.method.fit(pairs, values.view()).err()
+        };
         let empty = fit(&[], &Array2::zeros((0, 1)));
         assert!(matches!(empty, Some(Error::Empty { .. })));
         let short = fit(&pairs[..9], &good);

@@ -6,7 +6,7 @@ use rand::seq::index;
 use crate::error::Result;
 use crate::fit::{AnyFit, Fit, Model};
 use crate::streams::{self, generator};
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// A method that is fitted to a random subset where there are more measurements than it can
 /// afford: dense kernel matrices grow with the square of the rows, their decompositions with the
@@ -22,14 +22,14 @@ pub(crate) struct Thinned {
 impl Fit for Thinned {
     type Model = Box<dyn Model>;
 
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+    fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         if pairs.len() <= self.most || pairs.len() != values.nrows() {
             return self.method.fit(pairs, values);
         }
         let mut random = generator(self.seed, streams::SUBSAMPLE);
         let mut rows = index::sample(&mut random, pairs.len(), self.most).into_vec();
         rows.sort_unstable();
-        let kept: Vec<Pair> = rows.iter().map(|&row| pairs[row]).collect();
+        let kept: Vec<DirectionPair> = rows.iter().map(|&row| pairs[row]).collect();
         self.method.fit(&kept, values.select(Axis(0), &rows).view())
     }
 }
@@ -47,8 +47,8 @@ mod tests {
 
     #[test]
     fn no_more_rows_than_allowed_are_used_and_the_seed_says_which() {
-        let pairs: Vec<Pair> = (0..50)
-            .map(|i| Pair {
+        let pairs: Vec<DirectionPair> = (0..50)
+            .map(|i| DirectionPair {
                 incident: cartesian(0.02 * f64::from(i), 0.0),
                 outgoing: cartesian(0.5, 0.1 * f64::from(i)),
             })

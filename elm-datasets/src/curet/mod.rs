@@ -24,9 +24,10 @@ use ndarray::{Array2, ArrayViewMut1};
 pub use crate::material_id::{MATERIALS, MaterialId, NAMES};
 pub use write::write;
 
+use crate::Error;
 use crate::file;
+use crate::geometry::DirectionPair;
 use crate::measurements::{Invalid, Material, Measurements, Origin};
-use crate::{Directions, Error};
 
 /// How many pairs of directions there are.
 pub const MEASUREMENTS: usize = 205;
@@ -121,7 +122,7 @@ pub fn read(dir: &Path, ids: &[MaterialId], invalid: Invalid) -> Result<Measurem
 ///
 /// # Errors
 /// As for [`read`], of a damaged file.
-pub fn parse_table(bytes: &[u8], name: impl AsRef<Path>) -> Result<Vec<Directions>, Error> {
+pub fn parse_table(bytes: &[u8], name: impl AsRef<Path>) -> Result<Vec<DirectionPair>, Error> {
     parse::table(name.as_ref(), bytes)
 }
 

@@ -6,9 +6,10 @@ use std::path::Path;
 use ndarray::ArrayViewMut1;
 
 use super::{MATERIALS, MEASUREMENTS, MaterialId};
+use crate::Error;
 use crate::error::{Column, Entry};
+use crate::geometry::{Angles, DirectionPair, NORMAL};
 use crate::text::shorten;
-use crate::{Directions, Error};
 
 /// The four angles in the order of `table.txt`: the viewer comes first.
 const ANGLES: [&str; 4] = ["theta_o", "phi_o", "theta_i", "phi_i"];
@@ -133,12 +134,10 @@ fn each_entry<'a>(
 }
 
 /// The bytes of `table.txt` as directions, in the order of their numbers.
-pub(super) fn table(path: &Path, bytes: &[u8]) -> Result<Vec<Directions>, Error> {
-    let unset = Directions {
-        theta_i: 0.0,
-        phi_i: 0.0,
-        theta_o: 0.0,
-        phi_o: 0.0,
+pub(super) fn table(path: &Path, bytes: &[u8]) -> Result<Vec<DirectionPair>, Error> {
+    let unset = DirectionPair {
+        incident: NORMAL,
+        outgoing: NORMAL,
     };
     let mut directions = vec![unset; MEASUREMENTS];
     each_entry(
@@ -150,7 +149,7 @@ pub(super) fn table(path: &Path, bytes: &[u8]) -> Result<Vec<Directions>, Error>
             let mut angles = [0.0; 4];
             line.values(ArrayViewMut1::from(&mut angles))?;
             let [theta_o, phi_o, theta_i, phi_i] = angles;
-            let found = Directions {
+            let found = Angles {
                 theta_i,
                 phi_i,
                 theta_o,
@@ -169,7 +168,7 @@ pub(super) fn table(path: &Path, bytes: &[u8]) -> Result<Vec<Directions>, Error>
                     expected,
                 },
             )?;
-            directions[index] = found;
+            directions[index] = found.into();
             Ok(())
         },
     )?;
@@ -184,8 +183,8 @@ pub(super) struct Wrong {
 }
 
 /// Both polar angles above the horizon, both azimuths within a turn; NaN is out of range.
-pub(super) fn check_angles(directions: &Directions) -> Result<(), Wrong> {
-    let Directions {
+pub(super) fn check_angles(directions: &Angles) -> Result<(), Wrong> {
+    let Angles {
         theta_i,
         phi_i,
         theta_o,

@@ -16,7 +16,7 @@
 use std::f64::consts::PI;
 
 use super::MEASUREMENTS;
-use crate::Directions;
+use crate::geometry::{Angles, DirectionPair, Vector, dot};
 
 /// Measurements per camera station, in the order of the measurements.
 pub const BLOCKS: [usize; 7] = [55, 48, 39, 28, 19, 12, 4];
@@ -25,8 +25,6 @@ pub const BLOCKS: [usize; 7] = [55, 48, 39, 28, 19, 12, 4];
 const SEGMENTS: i32 = 8;
 /// Largest angle between normal and camera; the lattice has none between 83.9 degrees and this.
 const CAMERA_LIMIT: f64 = 85.0 * PI / 180.0;
-
-type Vector = [f64; 3];
 
 /// Angle between lamp and camera at a station, 0 to 6, in radians: (`station` + 1) times 22.5
 /// degrees.
@@ -38,15 +36,19 @@ pub fn station_angle(station: usize) -> f64 {
 /// The pairs of directions in the order of CUReT's measurements: by station, then by falling
 /// `theta_i`, then by `phi_i` from -pi (printed as pi) upwards.
 #[must_use]
-pub fn directions() -> Vec<Directions> {
+pub fn directions() -> Vec<DirectionPair> {
+    angles().into_iter().map(DirectionPair::from).collect()
+}
+
+fn angles() -> Vec<Angles> {
     let mut all = Vec::with_capacity(MEASUREMENTS);
     for station in 0..BLOCKS.len() {
         let (sin, cos) = station_angle(station).sin_cos();
-        let mut block: Vec<Directions> = normals()
+        let mut block: Vec<Angles> = normals()
             .filter_map(|normal| seen_from(normal, [sin, 0.0, cos]))
             .collect();
         // Rounded, so that orientations with the lamp equally high count as such on any machine.
-        let order = |d: &Directions| {
+        let order = |d: &Angles| {
             let phi = if d.phi_i == PI { -PI } else { d.phi_i };
             [-d.theta_i, phi].map(|angle| (angle * 1e9).round() as i64)
         };
@@ -88,7 +90,7 @@ fn lattice_point(index: [i32; 3]) -> Vector {
 }
 
 /// Lamp (along z) and camera as the sample with this normal sees them, if both are high enough.
-fn seen_from(normal: Vector, camera: Vector) -> Option<Directions> {
+fn seen_from(normal: Vector, camera: Vector) -> Option<Angles> {
     let [x, _, z] = normal;
     // The sample's first axis stays in the plane of lamp and camera.
     let first = unit([-z, 0.0, x]);
@@ -101,16 +103,12 @@ fn seen_from(normal: Vector, camera: Vector) -> Option<Directions> {
     };
     let (theta_i, phi_i) = polar([0.0, 0.0, 1.0]);
     let (theta_o, phi_o) = polar(camera);
-    (theta_o < CAMERA_LIMIT).then_some(Directions {
+    (theta_o < CAMERA_LIMIT).then_some(Angles {
         theta_i,
         phi_i,
         theta_o,
         phi_o,
     })
-}
-
-fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 fn cross(a: Vector, b: Vector) -> Vector {
@@ -131,14 +129,27 @@ mod tests {
     use super::*;
 
     /// Each pair with the index of its station.
-    fn with_stations() -> Vec<(usize, Directions)> {
+    fn with_stations() -> Vec<(usize, Angles)> {
         let stations = BLOCKS
             .iter()
             .enumerate()
             .flat_map(|(s, &count)| vec![s; count]);
-        let all = directions();
+        let all = angles();
         assert_eq!(all.len(), BLOCKS.iter().sum::<usize>());
         stations.zip(all).collect()
+    }
+
+    /// Greatest difference in the three numbers that an isotropic surface sees.
+    fn apart(a: &DirectionPair, b: &DirectionPair) -> f64 {
+        let (of_a, of_b) = (Angles::of(a), Angles::of(b));
+        let differences = [
+            of_a.theta_i - of_b.theta_i,
+            of_a.theta_o - of_b.theta_o,
+            a.cos_between() - b.cos_between(),
+        ];
+        differences
+            .into_iter()
+            .fold(0.0, |most, part| part.abs().max(most))
     }
 
     #[test]
@@ -150,7 +161,7 @@ mod tests {
     #[test]
     fn the_angle_between_lamp_and_camera_is_that_of_the_station() {
         for (station, pair) in with_stations() {
-            let angle = pair.cos_between().acos();
+            let angle = DirectionPair::from(pair).cos_between().acos();
             assert!(
                 (angle - station_angle(station)).abs() < 1e-12,
                 "{station}: {pair:?}"
@@ -160,13 +171,8 @@ mod tests {
 
     #[test]
     fn lamp_and_camera_stay_above_the_horizon() {
-        let highest = |angle: fn(&Directions) -> f64| {
-            directions()
-                .iter()
-                .map(angle)
-                .fold(0.0, f64::max)
-                .to_degrees()
-        };
+        let highest =
+            |angle: fn(&Angles) -> f64| angles().iter().map(angle).fold(0.0, f64::max).to_degrees();
         assert!((highest(|d| d.theta_i) - 78.75).abs() < 1e-9);
         let camera = highest(|d| d.theta_o);
         assert!((83.8..84.0).contains(&camera), "{camera}");
@@ -177,10 +183,7 @@ mod tests {
         let all = directions();
         for (k, a) in all.iter().enumerate() {
             for b in &all[..k] {
-                let far = (a.theta_i - b.theta_i).abs() > 1e-6
-                    || (a.theta_o - b.theta_o).abs() > 1e-6
-                    || (a.cos_between() - b.cos_between()).abs() > 1e-6;
-                assert!(far, "{a:?} {b:?}");
+                assert!(apart(a, b) > 1e-6, "{a:?} {b:?}");
             }
         }
     }
@@ -204,10 +207,8 @@ mod tests {
         let all = directions();
         let (mut pairs, mut alone) = (0, 0);
         for (k, a) in all.iter().enumerate() {
-            for (j, b) in all[..=k].iter().map(Directions::swapped).enumerate() {
-                let same = (a.theta_i - b.theta_i).abs() < 1e-9
-                    && (a.theta_o - b.theta_o).abs() < 1e-9
-                    && (a.cos_between() - b.cos_between()).abs() < 1e-9;
+            for (j, b) in all[..=k].iter().map(|pair| pair.swapped()).enumerate() {
+                let same = apart(a, &b) < 1e-9;
                 *(if j == k { &mut alone } else { &mut pairs }) += usize::from(same);
             }
         }

@@ -6,7 +6,8 @@ use std::path::Path;
 use super::parse::{Wrong, check_angles};
 use super::{AVERAGE, COLOURS, MATERIALS, MEASUREMENTS, MaterialId, TABLE};
 use crate::error::Layout;
-use crate::{Directions, Error, Material, Measurements};
+use crate::geometry::{Angles, DirectionPair};
+use crate::{Error, Material, Measurements};
 
 /// Writes `table.txt` and the value files of the channels into `dir`, in CUReT's layout: angles
 /// with six decimals, values with three. What the database has [`read`](super::read) (negative
@@ -30,7 +31,7 @@ pub fn write(dir: &Path, measurements: &Measurements) -> Result<(), Error> {
     save(dir, TABLE, &table_text(&measurements.directions))
 }
 
-fn check_directions(directions: &[Directions]) -> Result<(), Layout> {
+fn check_directions(directions: &[DirectionPair]) -> Result<(), Layout> {
     if directions.len() != MEASUREMENTS {
         return Err(Layout::Directions {
             found: directions.len(),
@@ -38,7 +39,7 @@ fn check_directions(directions: &[Directions]) -> Result<(), Layout> {
         });
     }
     for (index, pair) in directions.iter().enumerate() {
-        check_angles(pair).map_err(
+        check_angles(&Angles::of(pair)).map_err(
             |Wrong {
                  angle,
                  value,
@@ -116,22 +117,32 @@ fn check_values(material: &Material, channels: usize) -> Result<(), Layout> {
 }
 
 /// As the database has it: CRLF between the lines, none after the last.
-fn table_text(directions: &[Directions]) -> String {
+fn table_text(directions: &[DirectionPair]) -> String {
     let lines: Vec<String> = directions
         .iter()
         .enumerate()
-        .map(|(index, d)| {
+        .map(|(index, pair)| {
+            let angles = Angles::of(pair);
             format!(
                 "{:<6}{:.6}   {:>9}   {:.6}   {:>9}",
                 index + 1,
-                d.theta_o,
-                format!("{:.6}", d.phi_o),
-                d.theta_i,
-                format!("{:.6}", d.phi_i)
+                angles.theta_o,
+                azimuth(angles.phi_o),
+                angles.theta_i,
+                azimuth(angles.phi_i)
             )
         })
         .collect();
     lines.join("\r\n")
+}
+
+/// Half a turn is positive in the database.
+fn azimuth(phi: f64) -> String {
+    let text = format!("{phi:.6}");
+    match text.strip_prefix('-') {
+        Some(half @ "3.141593") => half.to_owned(),
+        _ => text,
+    }
 }
 
 /// As the database has it: LF after every line, and a blank before it.

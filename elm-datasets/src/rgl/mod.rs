@@ -46,7 +46,7 @@ use ndarray::{Array2, ArrayViewMut2};
 
 use crate::brdf::{Brdf, EvalError, check_arguments};
 pub use crate::error::rgl::Problem;
-use crate::geometry::{Pair, half_vector, polar};
+use crate::geometry::{DirectionPair, half_vector, polar};
 use crate::{Error, Samples, Sampling, file};
 use tensor::{F32, Field, U8};
 use warp::{Axis, Size, Warp};
@@ -196,18 +196,18 @@ impl Rgl {
     /// negative numbers, which become zero as in the authors' program. A spectrum is left as it
     /// is. NaN for azimuths that are not finite.
     #[must_use]
-    pub fn at(&self, directions: impl Into<Pair>) -> Vec<f64> {
+    pub fn at(&self, directions: &DirectionPair) -> Vec<f64> {
         let mut values = vec![0.0; self.channels.count()];
-        self.write_at(directions.into(), &mut values);
+        self.write_at(directions, &mut values);
         values
     }
 
     /// `values` has a zero for each channel.
-    fn write_at(&self, pair: Pair, values: &mut [f64]) {
-        let Pair {
+    fn write_at(&self, pair: &DirectionPair, values: &mut [f64]) {
+        let DirectionPair {
             incident: light,
             outgoing: viewer,
-        } = pair;
+        } = *pair;
         let Some(normal) = half_vector(light, viewer).filter(|_| light[2] > 0.0 && viewer[2] > 0.0)
         else {
             return;
@@ -269,7 +269,7 @@ impl Brdf for Rgl {
 
     fn eval_into(
         &self,
-        pairs: &[Pair],
+        pairs: &[DirectionPair],
         mut values: ArrayViewMut2<'_, f64>,
     ) -> Result<(), EvalError> {
         let channels = self.channels.count();
@@ -277,7 +277,7 @@ impl Brdf for Rgl {
         let mut found = vec![0.0; channels];
         for (mut row, pair) in values.rows_mut().into_iter().zip(pairs) {
             found.fill(0.0);
-            self.write_at(*pair, &mut found);
+            self.write_at(pair, &mut found);
             for (to, value) in row.iter_mut().zip(&found) {
                 *to = value.max(0.0);
             }

@@ -4,9 +4,8 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::Note;
-use crate::Directions;
 use crate::error::scattered::{ANGLES, AngleUnit, Problem};
-use crate::geometry::{Pair, Vector, dot};
+use crate::geometry::{Angles, DirectionPair, Vector, dot};
 
 /// How far from 1 the length of a direction may be: numbers with three decimals are each up to
 /// 0.0005 off, so the length up to `sqrt(3) * 0.0005`.
@@ -19,7 +18,7 @@ pub(crate) const HORIZON_TOLERANCE: f64 = 5e-4;
 /// What a row's directions are.
 pub(super) enum Found {
     /// Both above the surface, or on its horizon.
-    Reflected(Directions),
+    Reflected(DirectionPair),
     /// The viewer is below the surface: what is wrong with that, should no other row be better.
     Transmitted(Problem),
 }
@@ -84,12 +83,12 @@ impl Reader {
         let [theta_i, phi_i, theta_o, phi_o] = radians;
         Ok(match below {
             Some(problem) => Found::Transmitted(problem),
-            None => Found::Reflected(Directions {
+            None => Found::Reflected(DirectionPair::from(Angles {
                 theta_i,
                 phi_i,
                 theta_o,
                 phi_o,
-            }),
+            })),
         })
     }
 
@@ -112,10 +111,14 @@ impl Reader {
         };
         let light = check("wi", [ix, iy, iz])??;
         Ok(match check("wo", [ox, oy, oz])? {
-            Ok(viewer) => Found::Reflected(Directions::from(&Pair {
-                incident: light,
-                outgoing: viewer,
-            })),
+            Ok(viewer) => {
+                let pair = DirectionPair {
+                    incident: light,
+                    outgoing: viewer,
+                };
+                // Vectors with few digits become unit vectors.
+                Found::Reflected(pair.through_angles())
+            }
             Err(problem) => Found::Transmitted(problem),
         })
     }

@@ -4,7 +4,8 @@ use std::collections::HashMap;
 
 use ndarray::Array2;
 
-use crate::{Directions, Samples, channel};
+use crate::geometry::DirectionPair;
+use crate::{Samples, channel};
 
 /// Most wavelengths of a table: a column that has more values than this is none of wavelengths.
 const MOST: usize = 1000;
@@ -49,9 +50,9 @@ pub(super) fn pivot(
     }
 
     // How often a pair has had a wavelength, and the row of each pair's n-th time.
-    let mut times: HashMap<([u64; 4], usize), usize> = HashMap::new();
-    let mut rows: HashMap<([u64; 4], usize), usize> = HashMap::new();
-    let mut directions: Vec<Directions> = Vec::new();
+    let mut times: HashMap<([u64; 6], usize), usize> = HashMap::new();
+    let mut rows: HashMap<([u64; 6], usize), usize> = HashMap::new();
+    let mut directions: Vec<DirectionPair> = Vec::new();
     let mut cells: Vec<(usize, usize, f64)> = Vec::with_capacity(wavelengths.len());
     for (row, (pair, wavelength)) in samples.directions.iter().zip(wavelengths).enumerate() {
         let (Some(&place), Some(&value)) = (
@@ -60,8 +61,9 @@ pub(super) fn pivot(
         ) else {
             continue;
         };
-        // 0 and -0 are one angle.
-        let key = [pair.theta_i, pair.phi_i, pair.theta_o, pair.phi_o].map(|a| (a + 0.0).to_bits());
+        let ([a, b, c], [d, e, f]) = (pair.incident, pair.outgoing);
+        // 0 and -0 are one number.
+        let key = [a, b, c, d, e, f].map(|part| (part + 0.0).to_bits());
         let time = times.entry((key, place)).or_insert(0);
         let to = *rows.entry((key, *time)).or_insert_with(|| {
             directions.push(*pair);

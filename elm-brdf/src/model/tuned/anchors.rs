@@ -19,7 +19,7 @@ use rand::seq::index;
 use rand_chacha::ChaCha8Rng;
 
 use crate::streams::{self, generator};
-use elm_datasets::geometry::{NORMAL, Pair, cartesian, dot};
+use elm_datasets::geometry::{DirectionPair, NORMAL, cartesian, dot};
 
 /// Anchors laid over the hemisphere, and further ones for light and viewer near the horizon, where
 /// measurements end and a highlight's extrapolation grows fastest.
@@ -33,7 +33,7 @@ const LISTED: usize = 24;
 const JUDGED: usize = 200;
 
 /// Coordinates in which near means alike.
-fn place(pair: &Pair) -> [f64; 3] {
+fn place(pair: &DirectionPair) -> [f64; 3] {
     let angles = pair.half_difference();
     [
         2.0 * angles.theta_h().sqrt(),
@@ -51,7 +51,7 @@ pub(super) struct Neighbourhood {
 }
 
 impl Neighbourhood {
-    pub(super) fn new(pairs: &[Pair]) -> Self {
+    pub(super) fn new(pairs: &[DirectionPair]) -> Self {
         Self {
             places: pairs.iter().map(place).collect(),
         }
@@ -76,7 +76,11 @@ impl Neighbourhood {
     }
 
     /// The guess for each of `pairs` of what `values`, shape (measurements, channels), are there.
-    pub(super) fn guess(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Array2<f64> {
+    pub(super) fn guess(
+        &self,
+        pairs: &[DirectionPair],
+        values: ArrayView2<'_, f64>,
+    ) -> Array2<f64> {
         let mut guesses = Array2::zeros((pairs.len(), values.ncols()));
         for (pair, guess) in pairs.iter().zip(guesses.rows_mut()) {
             let near = self.nearest(place(pair), NEAREST, None);
@@ -105,7 +109,7 @@ fn mean_of(near: &[Near], values: ArrayView2<'_, f64>, mut guess: ndarray::Array
 /// The anchors of a set of measurements.
 pub(super) struct Anchors {
     /// Where they are.
-    pub(super) pairs: Vec<Pair>,
+    pub(super) pairs: Vec<DirectionPair>,
     near: Vec<Vec<Near>>,
     /// Squared distance between each of some measurements and its nearest others, with these.
     judged: Vec<(usize, Vec<Near>)>,
@@ -176,13 +180,13 @@ impl Anchors {
 
 /// Pairs of directions over the hemisphere: half of [`ANCHORS`] anywhere by both angles, half by the
 /// half vector, near the mirror direction; and [`GRAZING`] ones in both of whose directions near the horizon.
-fn scatter(random: &mut ChaCha8Rng) -> Vec<Pair> {
+fn scatter(random: &mut ChaCha8Rng) -> Vec<DirectionPair> {
     let mut pairs = Vec::with_capacity(ANCHORS + GRAZING);
     while pairs.len() < ANCHORS {
         if pairs.len() % 2 == 0 {
             let mut theta = || random.random_range(0.0..FRAC_PI_2);
             let (theta_i, theta_o) = (theta(), theta());
-            pairs.push(Pair {
+            pairs.push(DirectionPair {
                 incident: cartesian(theta_i, 0.0),
                 outgoing: cartesian(theta_o, random.random_range(0.0..PI)),
             });
@@ -198,13 +202,13 @@ fn scatter(random: &mut ChaCha8Rng) -> Vec<Pair> {
         let incident = about(half, light);
         let along = 2.0 * dot(incident, half);
         let outgoing = [0, 1, 2].map(|axis| along * half[axis] - incident[axis]);
-        let pair = Pair { incident, outgoing };
+        let pair = DirectionPair { incident, outgoing };
         // Half vectors that tilt far have few lights: the others stand for these too.
         pairs.push(if pair.is_above_horizon() {
             pair
         } else {
             let theta = random.random_range(0.0..FRAC_PI_2);
-            Pair {
+            DirectionPair {
                 incident: cartesian(theta, 0.0),
                 outgoing: cartesian(theta, PI * (1.0 - part * part)),
             }
@@ -214,7 +218,7 @@ fn scatter(random: &mut ChaCha8Rng) -> Vec<Pair> {
         let mut theta = || FRAC_PI_2 * (1.0 - 0.25 * random.random_range(0.0_f64..1.0).powi(2));
         let (theta_i, theta_o) = (theta(), theta());
         let part: f64 = random.random_range(0.0..1.0);
-        pairs.push(Pair {
+        pairs.push(DirectionPair {
             incident: cartesian(theta_i, 0.0),
             outgoing: cartesian(theta_o, PI * (1.0 - part * part)),
         });

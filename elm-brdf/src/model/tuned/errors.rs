@@ -5,7 +5,7 @@ use ndarray::{Array1, ArrayView1, ArrayView2};
 use crate::error::Error;
 use crate::link::FittedLink;
 use crate::metrics::Metric;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// Of the errors the largest are cut off at this quantile, lest a few rows decide.
 const QUANTILE: f64 = 0.99;
@@ -24,7 +24,7 @@ pub(super) fn no_fit() -> Error {
 /// others.
 pub(super) fn row_weights(
     metric: Metric,
-    pairs: &[Pair],
+    pairs: &[DirectionPair],
     values: ArrayView2<'_, f64>,
     link: &FittedLink,
 ) -> Option<Array1<f64>> {

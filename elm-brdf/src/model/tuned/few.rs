@@ -17,7 +17,7 @@ use crate::link::{FittedLink, Link};
 use crate::model::BrdfModel;
 use crate::scales::spread;
 use crate::streams::{self, generator};
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// Most neurons, unless they are asked for.
 const NEURONS: usize = 400;
@@ -53,7 +53,7 @@ const CLOSE: f64 = 0.03;
 /// One model for each group of channels.
 pub(super) fn fit(
     tuned: &Tuned,
-    pairs: &[Pair],
+    pairs: &[DirectionPair],
     values: ArrayView2<'_, f64>,
     groups: &[Vec<usize>],
 ) -> Result<Vec<BrdfModel>> {
@@ -119,7 +119,7 @@ struct Search<'a> {
 impl<'a> Search<'a> {
     fn new(
         tuned: &'a Tuned,
-        pairs: &[Pair],
+        pairs: &[DirectionPair],
         values: ArrayView2<'a, f64>,
         link: &FittedLink,
     ) -> Result<Self> {

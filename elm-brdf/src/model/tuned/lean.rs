@@ -16,7 +16,7 @@ use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
 use crate::model::{BrdfModel, Layer};
 use crate::streams::{self, generator};
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// A network of so many neurons of one function, made for cheap [evaluation](crate::batch).
 ///
@@ -39,12 +39,11 @@ use elm_datasets::geometry::Pair;
 ///
 /// ```
 /// use elm_brdf::{batch::Packed, model::Lean};
-/// use elm_datasets::geometry::pairs;
 /// use elm_datasets::{Invalid, MaterialId, synthetic};
 ///
 /// let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
 /// let samples = data.samples(0).ok_or("no such material")?;
-/// let model = Lean::new(16).fit_model(&pairs(&samples.directions), samples.values.view())?;
+/// let model = Lean::new(16).fit_model(&samples.directions, samples.values.view())?;
 /// let packed: Packed<f32> = Packed::new(&model)?;
 /// assert_eq!(packed.neurons(), 16);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -94,7 +93,11 @@ impl Lean {
     ///
     /// # Errors
     /// Where these measurements cannot be fitted, or the settings are out of range.
-    pub fn fit_model(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<BrdfModel> {
+    pub fn fit_model(
+        &self,
+        pairs: &[DirectionPair],
+        values: ArrayView2<'_, f64>,
+    ) -> Result<BrdfModel> {
         check(pairs, values)?;
         let link = Link::default_log().fit(values)?;
         let targets = link.to_targets(values)?;
@@ -170,7 +173,7 @@ impl Lean {
 impl Fit for Lean {
     type Model = BrdfModel;
 
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+    fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         self.fit_model(pairs, values)
     }
 }
@@ -185,7 +188,7 @@ fn ridge(rows: usize) -> Ridge {
     }
 }
 
-fn select(pairs: &[Pair], rows: &[usize]) -> Vec<Pair> {
+fn select(pairs: &[DirectionPair], rows: &[usize]) -> Vec<DirectionPair> {
     rows.iter().map(|&row| pairs[row]).collect()
 }
 
@@ -209,7 +212,7 @@ struct Search<'a> {
 }
 
 struct Judge {
-    pairs: Vec<Pair>,
+    pairs: Vec<DirectionPair>,
     x: Array2<f64>,
     values: Array2<f64>,
 }

@@ -16,7 +16,7 @@ use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
 use crate::model::BrdfModel;
 use crate::streams::{self, generator};
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// Neurons unless said otherwise: some 675 numbers for three channels.
 pub(super) const NEURONS: usize = 213;
@@ -48,7 +48,11 @@ fn drawn(neurons: usize) -> usize {
     (4 * neurons).min((neurons + neurons / 2).max(320))
 }
 
-pub(super) fn fit(tuned: &Tuned, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<BrdfModel> {
+pub(super) fn fit(
+    tuned: &Tuned,
+    pairs: &[DirectionPair],
+    values: ArrayView2<'_, f64>,
+) -> Result<BrdfModel> {
     let mut link = Link::default_log().fit(values)?;
     let mut random = generator(tuned.seed, streams::MANY);
     let wanted = pairs.len().min(2 * SEARCH_ROWS);
@@ -113,13 +117,13 @@ fn finished(problem: &Problem<'_>, setting: &Setting, rows: &[usize]) -> Result<
 
 /// Some of the rows.
 struct Part {
-    pairs: Vec<Pair>,
+    pairs: Vec<DirectionPair>,
     values: Array2<f64>,
     targets: Array2<f64>,
 }
 
 fn part(
-    pairs: &[Pair],
+    pairs: &[DirectionPair],
     values: ArrayView2<'_, f64>,
     targets: &Array2<f64>,
     rows: &[usize],
@@ -171,7 +175,7 @@ impl<'a> Search<'a> {
     fn new(
         tuned: &'a Tuned,
         link: &'a FittedLink,
-        pairs: &[Pair],
+        pairs: &[DirectionPair],
         values: ArrayView2<'_, f64>,
         rows: &[usize],
     ) -> Result<Self> {

@@ -9,7 +9,7 @@ use super::errors::row_weights;
 use crate::error::Result;
 use crate::link::FittedLink;
 use crate::streams::{self, generator};
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// Folds of the cross-validation.
 const FOLDS: usize = 5;
@@ -21,7 +21,7 @@ const KNOWN: usize = 4_000;
 /// Measurements to be fitted, for all sets of inputs.
 pub(super) struct Problem<'a> {
     pub(super) tuned: &'a Tuned,
-    pub(super) pairs: &'a [Pair],
+    pub(super) pairs: &'a [DirectionPair],
     pub(super) values: ArrayView2<'a, f64>,
     pub(super) link: FittedLink,
     /// Standard deviation of the noise of each channel's dark values, in 1/sr.
@@ -34,7 +34,7 @@ pub(super) struct Problem<'a> {
     pub(super) folds: Vec<Vec<usize>>,
     /// All rows of the folds, in their order.
     pub(super) judged: Vec<usize>,
-    pub(super) judged_pairs: Vec<Pair>,
+    pub(super) judged_pairs: Vec<DirectionPair>,
     /// The measurements that guesses are made from, as places among the judged.
     pub(super) known: Vec<usize>,
     pub(super) neighbourhood: Neighbourhood,
@@ -44,7 +44,7 @@ pub(super) struct Problem<'a> {
 impl<'a> Problem<'a> {
     pub(super) fn new(
         tuned: &'a Tuned,
-        pairs: &'a [Pair],
+        pairs: &'a [DirectionPair],
         values: ArrayView2<'a, f64>,
         link: FittedLink,
         noise: Vec<f64>,
@@ -58,11 +58,12 @@ impl<'a> Problem<'a> {
             .map(|fold| judged.iter().copied().skip(fold).step_by(count).collect())
             .collect();
         let judged: Vec<usize> = folds.concat();
-        let judged_pairs: Vec<Pair> = judged.iter().map(|&row| pairs[row]).collect();
+        let judged_pairs: Vec<DirectionPair> = judged.iter().map(|&row| pairs[row]).collect();
         let known: Vec<usize> = (0..judged.len())
             .step_by(judged.len().div_ceil(KNOWN).max(1))
             .collect();
-        let known_pairs: Vec<Pair> = known.iter().map(|&place| judged_pairs[place]).collect();
+        let known_pairs: Vec<DirectionPair> =
+            known.iter().map(|&place| judged_pairs[place]).collect();
         let neighbourhood = Neighbourhood::new(&known_pairs);
         Ok(Self {
             targets: link.to_targets(values)?,
@@ -109,7 +110,7 @@ impl<'a> Problem<'a> {
     }
 
     /// What the nearest measurements say of the targets at any pairs.
-    pub(super) fn neighbours_guess(&self, pairs: &[Pair]) -> Array2<f64> {
+    pub(super) fn neighbours_guess(&self, pairs: &[DirectionPair]) -> Array2<f64> {
         let targets = self.targets(&self.known_rows());
         self.neighbourhood.guess(pairs, targets.view())
     }

@@ -7,7 +7,7 @@ use crate::albedo::{self, Node};
 use crate::error::Result;
 use crate::features::Features;
 use crate::link::FittedLink;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// Angles of the light in degrees at which the albedo must be physical besides the stated ones.
 const FURTHER_ANGLES: [f64; 3] = [80.0, 88.0, 89.5];
@@ -53,7 +53,7 @@ impl Survey {
         features: Features,
         network: &Elm<f64>,
         link: &FittedLink,
-        nearest: impl Fn(&[Pair]) -> Array2<f64>,
+        nearest: impl Fn(&[DirectionPair]) -> Array2<f64>,
     ) -> Result<f64> {
         let mut excess = 0.0_f64;
         let orders: &[bool] = if features.is_reciprocal() {
@@ -70,7 +70,7 @@ impl Survey {
                         node.pair
                     }
                 };
-                let pairs: Vec<Pair> = nodes.iter().map(of).collect();
+                let pairs: Vec<DirectionPair> = nodes.iter().map(of).collect();
                 let sums = |targets: Array2<f64>| -> Result<Vec<f64>> {
                     Ok(albedo::sums(nodes, link.to_values(targets)?.view()))
                 };

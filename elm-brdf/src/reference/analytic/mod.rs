@@ -16,18 +16,18 @@ use crate::error::Result;
 use crate::fit::{Fit, Model, assign, check};
 use elm_datasets::Brdf;
 use elm_datasets::brdf::check_directions;
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// Analytic models with the parameters found for each channel.
 ///
 /// ```
 /// use elm_datasets::Brdf;
-/// use elm_datasets::geometry::{Pair, cartesian};
+/// use elm_datasets::geometry::{DirectionPair, cartesian};
 /// use elm_brdf::reference::Analytic;
 /// use ndarray::Array2;
 ///
-/// let pairs: Vec<Pair> = (0..40)
-///     .map(|i| Pair {
+/// let pairs: Vec<DirectionPair> = (0..40)
+///     .map(|i| DirectionPair {
 ///         incident: cartesian(0.03 * f64::from(i), 0.0),
 ///         outgoing: cartesian(0.5, 0.2 * f64::from(i)),
 ///     })
@@ -85,7 +85,7 @@ impl Analytic {
     /// [`elm::Error`] naming measurements that are empty, not finite, or of other shapes.
     pub fn fit_analytic(
         self,
-        pairs: &[Pair],
+        pairs: &[DirectionPair],
         values: ArrayView2<'_, f64>,
     ) -> Result<AnalyticModel> {
         check(pairs, values)?;
@@ -93,7 +93,7 @@ impl Analytic {
             .iter()
             .enumerate()
             .filter_map(|(row, pair)| {
-                Some((row, Cosines::of_vectors(pair.incident, pair.outgoing)?))
+                Some((row, Cosines::of(pair)?))
             })
             .collect();
         let angles: Vec<Cosines> = above.iter().map(|&(_, angles)| angles).collect();
@@ -113,17 +113,17 @@ impl Analytic {
 impl Fit for Analytic {
     type Model = AnalyticModel;
 
-    fn fit(&self, pairs: &[Pair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
+    fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         self.fit_analytic(pairs, values)
     }
 }
 
 impl AnalyticModel {
-    fn values_at(&self, pairs: &[Pair]) -> Result<Array2<f64>> {
+    fn values_at(&self, pairs: &[DirectionPair]) -> Result<Array2<f64>> {
         check_directions(pairs)?;
         let mut out = Array2::zeros((pairs.len(), self.channels.len()));
         for (mut row, pair) in out.rows_mut().into_iter().zip(pairs) {
-            let Some(angles) = Cosines::of_vectors(pair.incident, pair.outgoing) else {
+            let Some(angles) = Cosines::of(pair) else {
                 continue;
             };
             for (value, channel) in row.iter_mut().zip(&self.channels) {
@@ -140,7 +140,11 @@ impl Brdf for AnalyticModel {
         self.channels.len()
     }
 
-    fn eval_into(&self, pairs: &[Pair], values: ArrayViewMut2<'_, f64>) -> Result<(), EvalError> {
+    fn eval_into(
+        &self,
+        pairs: &[DirectionPair],
+        values: ArrayViewMut2<'_, f64>,
+    ) -> Result<(), EvalError> {
         assign(self.values_at(pairs)?, values)
     }
 }

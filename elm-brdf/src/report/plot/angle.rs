@@ -4,7 +4,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::{BLUE, Chart, Drawn, GREEN, GREY, PALE, Shown, VERMILION, titled};
-use elm_datasets::geometry::Pair;
+use elm_datasets::geometry::DirectionPair;
 
 /// Width of a bin in degrees.
 const WIDTH: f64 = 10.0;
@@ -29,7 +29,7 @@ pub(super) struct ByAngle {
     noise_floor: Option<f64>,
 }
 
-fn angles(pair: &Pair) -> [f64; 3] {
+fn angles(pair: &DirectionPair) -> [f64; 3] {
     let polar = |v: [f64; 3]| v[0].hypot(v[1]).atan2(v[2]);
     let half = pair.half_difference().theta_h();
     [polar(pair.incident), polar(pair.outgoing), half].map(f64::to_degrees)

@@ -8,7 +8,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::{BLUE, Chart, Drawn, GREEN, GREY, PALE, Panel, VERMILION, round_step, titled};
 use crate::error::Result;
-use elm_datasets::geometry::{Pair, cartesian};
+use elm_datasets::geometry::{DirectionPair, cartesian};
 
 /// Angles of the light that are drawn, in degrees.
 const LIGHTS: [(f64, RGBColor); 3] = [(22.5, BLUE), (45.0, GREEN), (67.5, VERMILION)];
@@ -64,9 +64,9 @@ impl Drawing {
 fn curve(panel: &Panel<'_>, theta_i: f64) -> Result<Vec<Place>> {
     let angles = (1..STEPS).map(|step| step as f64 / STEPS as f64 * PI - FRAC_PI_2);
     let angles: Vec<f64> = angles.collect();
-    let pairs: Vec<Pair> = angles
+    let pairs: Vec<DirectionPair> = angles
         .iter()
-        .map(|&angle| Pair {
+        .map(|&angle| DirectionPair {
             // The light comes from the left.
             incident: cartesian(theta_i, PI),
             outgoing: cartesian(angle.abs(), if angle < 0.0 { PI } else { 0.0 }),

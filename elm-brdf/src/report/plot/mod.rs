@@ -23,7 +23,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use elm_datasets::{Directions, Measurements, Origin};
+use elm_datasets::{Measurements, Origin};
 use image::{ImageFormat, RgbImage};
 use ndarray::ArrayView2;
 use plotters::coord::Shift;
@@ -37,7 +37,7 @@ use crate::fit::Fit;
 use crate::pareto::Point;
 use crate::protocol::MaterialScores;
 use elm_datasets::Brdf;
-use elm_datasets::geometry::{self, Pair};
+use elm_datasets::geometry::DirectionPair;
 
 pub(super) const BLUE: RGBColor = RGBColor(0, 114, 178);
 pub(super) const ORANGE: RGBColor = RGBColor(230, 159, 0);
@@ -55,7 +55,7 @@ pub struct Shown<'a> {
     /// The material's name.
     pub name: String,
     /// The pairs of directions.
-    pub pairs: Vec<Pair>,
+    pub pairs: Vec<DirectionPair>,
     /// BRDF in 1/sr, shape (pairs, channels).
     pub measured: ArrayView2<'a, f64>,
     /// The same, predicted.
@@ -73,7 +73,7 @@ impl<'a> Shown<'a> {
     #[must_use]
     pub fn new(
         name: String,
-        directions: &[Directions],
+        directions: &[DirectionPair],
         measured: ArrayView2<'a, f64>,
         scores: &'a MaterialScores,
     ) -> Self {
@@ -81,7 +81,7 @@ impl<'a> Shown<'a> {
         let floors = channels().filter_map(|channel| channel.noise_floor);
         Self {
             name,
-            pairs: geometry::pairs(directions),
+            pairs: directions.to_vec(),
             measured,
             predicted: scores.predicted.view(),
             rmse: mean(channels().map(|channel| channel.held_out.rmse)).unwrap_or(0.0),
@@ -147,7 +147,7 @@ pub struct Panel<'a> {
     /// Which of the model's channels belong to the material; their mean is drawn.
     pub channels: Range<usize>,
     /// The pairs of directions that were measured.
-    pub pairs: &'a [Pair],
+    pub pairs: &'a [DirectionPair],
     /// BRDF in 1/sr, shape (pairs, channels of the material).
     pub measured: ArrayView2<'a, f64>,
 }
@@ -176,9 +176,8 @@ pub fn write_fitted_lobes(
         let Some(samples) = data.samples(index) else {
             continue;
         };
-        let pairs = geometry::pairs(&samples.directions);
-        let model = method.fit(&pairs, samples.values.view())?;
-        fitted.push((material, pairs, model));
+        let model = method.fit(&samples.directions, samples.values.view())?;
+        fitted.push((material, samples.directions, model));
     }
     let panels: Vec<Panel<'_>> = fitted
         .iter()
@@ -308,7 +307,7 @@ mod tests {
         let data = synthetic::measurements(1, &ids, Invalid::Clamp);
         let folds = Folds::new(data.directions.len(), 3, 1).unwrap();
         let scores = cross_validate(&Analytic::GgxLambert, &data, &folds, |_, _| {}).unwrap();
-        let pairs = geometry::pairs(&data.directions);
+        let pairs = &data.directions;
         let shown: Vec<Shown<'_>> = data
             .materials
             .iter()
