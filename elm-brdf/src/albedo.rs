@@ -127,7 +127,7 @@ mod tests {
             mut values: ArrayViewMut2<'_, f64>,
         ) -> Result<(), EvalError> {
             for (value, pair) in values.iter_mut().zip(pairs) {
-                let cosines = Cosines::of_vectors(pair.incident, pair.outgoing);
+                let cosines = Cosines::of(pair);
                 *value = cosines.map_or(0.0, |cosines| self.0(&cosines));
             }
             Ok(())

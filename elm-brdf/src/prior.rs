@@ -78,13 +78,13 @@ impl Default for PriorParams {
 /// let pairs = &data.directions;
 /// // The first channel of every material, the first of which is the new one.
 /// let values = Array2::from_shape_fn((205, 12), |(row, m)| data.materials[m].values[[row, 0]]);
-/// let prior = PriorParams::default().build(&pairs, values.view())?.without(&[0])?;
+/// let prior = PriorParams::default().build(pairs, values.view())?.without(&[0])?;
 /// // Twenty measurements of it.
 /// let rows: Vec<usize> = (0..200).step_by(10).collect();
 /// let at: Vec<_> = rows.iter().map(|&row| pairs[row]).collect();
 /// let few = values.select(Axis(0), &rows).select(Axis(1), &[0]);
 /// let model = prior.fit(&at, few.view())?;
-/// assert_eq!(model.eval(&pairs)?.dim(), (205, 1));
+/// assert_eq!(model.eval(pairs)?.dim(), (205, 1));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -196,7 +196,7 @@ pub fn cross_validate_pooled(
             for (mut column, material) in values.columns_mut().into_iter().zip(&whole) {
                 column.assign(&material.values.column(channel));
             }
-            params.build(&pairs, values.view())
+            params.build(pairs, values.view())
         })
         .collect::<Result<Vec<Prior>>>()?;
     let mut all = Vec::new();

@@ -200,7 +200,7 @@ mod tests {
         let data = synthetic::measurements(1, &[MaterialId::new(5).unwrap()], Invalid::Keep);
         let pairs = &data.directions;
         let red = data.materials[0].values.column(0);
-        let floor = NoiseFloor::of(&exchanged(&pairs), red).unwrap();
+        let floor = NoiseFloor::of(&exchanged(pairs), red).unwrap();
         let level = (red.mapv(|v| v * v).sum() / red.len() as f64).sqrt();
         // 30 pairs know a deviation to 1 / sqrt(60), 13 %; three times that.
         assert!(

@@ -93,14 +93,14 @@ fn models() -> Vec<(String, Box<dyn Brdf>)> {
         .enumerate()
         .map(|(index, (params, channels))| {
             let values = samples.values.slice(s![.., ..channels]);
-            let model: Box<dyn Brdf> = Box::new(params.fit(&pairs, values).unwrap());
+            let model: Box<dyn Brdf> = Box::new(params.fit(pairs, values).unwrap());
             (format!("m{index}"), model)
         })
         .collect();
     let usual = recipes::network(None);
     models.push((
         "usual".to_owned(),
-        usual.fit(&pairs, samples.values.view()).unwrap(),
+        usual.fit(pairs, samples.values.view()).unwrap(),
     ));
     models
 }
@@ -607,7 +607,7 @@ fn what_cannot_be_exported_is_an_error_of_its_own() {
             link: Link::default_log(),
             network,
         };
-        params.fit(&pairs, samples.values.view()).unwrap()
+        params.fit(pairs, samples.values.view()).unwrap()
     };
     let custom = model(network(
         9,

@@ -93,7 +93,7 @@ fn a_million_values_of_each_rgl_material_are_finite_and_not_negative() {
             ..Tuned::default()
         };
         let pairs = &samples.directions;
-        let model = tuned.fit_model(&pairs, samples.values.view()).unwrap();
+        let model = tuned.fit_model(pairs, samples.values.view()).unwrap();
         assert!(model.stored_floats() <= 675);
         let values = model.eval(&everywhere).unwrap();
         assert!(
@@ -118,13 +118,13 @@ fn a_metallic_paint_from_one_in_a_hundred_thousand_to_six_hundred_is_met_over_it
         .fit_model(&train.directions, train.values.view())
         .unwrap();
     let pairs = &test.directions;
-    let predicted = model.eval(&pairs).unwrap();
+    let predicted = model.eval(pairs).unwrap();
     let ceiling = Link::HEADROOM * train.values.iter().copied().fold(0.0, f64::max);
     assert!(predicted.iter().all(|&v| (0.0..=ceiling).contains(&v)));
-    let errors = Metrics::of(&pairs, predicted.view(), test.values.view()).unwrap();
+    let errors = Metrics::of(pairs, predicted.view(), test.values.view()).unwrap();
     // Of logarithms: black is off by the mean of all, and a constant by half of that at best.
     let black = Array2::zeros(test.values.dim());
-    let black = Metrics::of(&pairs, black.view(), test.values.view()).unwrap();
+    let black = Metrics::of(pairs, black.view(), test.values.view()).unwrap();
     assert!(
         errors.log_cosine_mae < 0.05 * black.log_cosine_mae,
         "{errors:?} {black:?}"
@@ -252,7 +252,7 @@ fn no_more_numbers_are_stored_than_allowed() {
         };
         for model in [
             tuned.fit_model(&pairs, values.view()).unwrap(),
-            tuned.fit_model(&many, paint.values.view()).unwrap(),
+            tuned.fit_model(many, paint.values.view()).unwrap(),
         ] {
             let stored = model.stored_floats();
             assert!(stored <= most && stored + 4 > most, "{stored} of {most}");

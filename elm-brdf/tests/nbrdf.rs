@@ -40,8 +40,8 @@ fn the_published_networks_have_the_errors_that_are_printed_for_them() {
         let file = dir.join(format!("rgl/{material}_rgb_test.csv"));
         let samples = open(&file, &OpenOptions::default()).unwrap().samples;
         let pairs = &samples.directions;
-        let predicted = network.eval(&pairs).unwrap();
-        let metrics = Metrics::of(&pairs, predicted.view(), samples.values.view()).unwrap();
+        let predicted = network.eval(pairs).unwrap();
+        let metrics = Metrics::of(pairs, predicted.view(), samples.values.view()).unwrap();
         println!("{material}: {:.6}", metrics.log_cosine_mae);
         // Printed to four digits after the point.
         assert!(

@@ -35,7 +35,7 @@ fn retroreflector(angles: &Cosines) -> f64 {
 }
 
 fn value(formula: Formula, pair: &DirectionPair) -> f64 {
-    Cosines::of_vectors(pair.incident, pair.outgoing).map_or(0.0, |angles| formula(&angles))
+    Cosines::of(pair).map_or(0.0, |angles| formula(&angles))
 }
 
 /// Light to 60 degrees in steps of 15, viewer to 80 in steps of 8, azimuths in steps of 18.

@@ -44,14 +44,14 @@ fn nearest() -> Result<Box<elm_brdf::fit::AnyFit>, Box<dyn Error>> {
 fn row(name: &str, samples: &Samples, seeds: u64) -> Result<f64, Box<dyn Error>> {
     let pairs = &samples.directions;
     let values = samples.values.view();
-    let implied = largest(nearest()?.fit(&pairs, values)?.as_ref())?;
+    let implied = largest(nearest()?.fit(pairs, values)?.as_ref())?;
     let mut most = (0.0, 0.0, String::new());
     for seed in 1..=seeds {
         let tuned = Tuned {
             seed,
             ..Tuned::default()
         };
-        let model = tuned.fit_model(&pairs, values)?;
+        let model = tuned.fit_model(pairs, values)?;
         let (found, degrees) = largest(&model)?;
         if found > most.0 {
             most = (found, degrees, model.features().to_string());

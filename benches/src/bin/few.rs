@@ -38,9 +38,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     // By way and number, the geometric mean over materials of each seed.
     let mut errors = vec![vec![Vec::new(); COUNTS.len()]; WAYS.len()];
     for seed in 1..=seeds {
-        let priors = priors(seed, &pairs, &values, &ids)?;
+        let priors = priors(seed, pairs, &values, &ids)?;
         for (place, count) in COUNTS.into_iter().enumerate() {
-            let found = run(seed, count, &pairs, &values, &priors)?;
+            let found = run(seed, count, pairs, &values, &priors)?;
             for (way, squares) in found.into_iter().enumerate() {
                 let rmse = squares.mapv(|square: f64| (square / pairs.len() as f64).sqrt());
                 let logs = rmse.mapv(f64::ln);

@@ -20,7 +20,6 @@ use elm_brdf::link::Link;
 use elm_brdf::metrics::Metrics;
 use elm_brdf::model::BrdfParams;
 use elm_brdf::protocol::{Folds, MaterialScores, cross_validate};
-use elm_datasets::geometry::DirectionPair;
 use elm_datasets::{Invalid, MaterialId, Measurements, curet, synthetic};
 use ndarray::{Array1, Array2, Axis};
 use serde_json::{Value, json};
@@ -123,7 +122,7 @@ fn one_channel(mut data: Measurements) -> Measurements {
 /// Inputs, values, cosines, folds and the random layer, as the script reads them.
 fn write(folder: &Path, data: &Measurements, folds: &Folds) -> Result<(), Box<dyn Error>> {
     let pairs = &data.directions;
-    let inputs = Features::Paper.compute(&pairs);
+    let inputs = Features::Paper.compute(pairs);
     let columns: Vec<_> = data.materials.iter().map(|m| m.values.column(0)).collect();
     let values = ndarray::stack(Axis(1), &columns)?;
     // The layer depends on the seed and the number of inputs alone.

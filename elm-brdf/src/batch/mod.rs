@@ -21,13 +21,13 @@
 //! let samples = data.samples(0).ok_or("no such material")?;
 //! let pairs = &samples.directions;
 //! let tuned = Tuned { neurons: Some(60), ..Tuned::default() };
-//! let model = tuned.fit_model(&pairs, samples.values.view())?;
+//! let model = tuned.fit_model(pairs, samples.values.view())?;
 //!
 //! let packed: Packed<f32> = Packed::new(&model)?;
-//! let directions: Columns<f32> = Columns::new(&pairs);
+//! let directions: Columns<f32> = Columns::new(pairs);
 //! let mut values = vec![0.0; 3 * pairs.len()]; // all reds, all greens, all blues
 //! packed.eval_into(&directions, &mut values)?;
-//! let red = model.eval(&pairs)?[[0, 0]];
+//! let red = model.eval(pairs)?[[0, 0]];
 //! assert!((f64::from(values[0]) - red).abs() < 1e-3 * (1.0 + red));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -93,10 +93,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     } = material;
     let samples = model.matched(samples)?;
     let pairs = &samples.directions;
-    let predicted = model.eval(&pairs).map_err(Error::from)?;
+    let predicted = model.eval(pairs).map_err(Error::from)?;
     let evaluation = Evaluation {
         rows: pairs.len(),
-        metrics: Metrics::of(&pairs, predicted.view(), samples.values.view())?,
+        metrics: Metrics::of(pairs, predicted.view(), samples.values.view())?,
         channels: samples.channels,
         stored_floats: model.stored_floats(),
         neurons: model.network().hidden().neurons(),

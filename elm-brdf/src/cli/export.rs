@@ -53,7 +53,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(file) => {
             let samples = reading.read(file)?.samples.in_rgb_order();
             let pairs = &samples.directions;
-            recipes::network(None).fit(&pairs, samples.values.view())?
+            recipes::network(None).fit(pairs, samples.values.view())?
         }
         None => {
             let library = library(reading.data.as_deref())?;

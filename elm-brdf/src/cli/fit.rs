@@ -76,7 +76,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let pairs = &samples.directions;
     let values = samples.values.view();
     let model = match prior {
-        Some(prior) => prior.fit_model(&pairs, values)?,
+        Some(prior) => prior.fit_model(pairs, values)?,
         None => Tuned {
             features: arguments.features,
             metric: arguments.metric,
@@ -84,7 +84,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
             max_floats: arguments.max_floats,
             seed: arguments.seed,
         }
-        .fit_model(&pairs, values)?,
+        .fit_model(pairs, values)?,
     };
     let seconds = start.elapsed().as_secs_f64();
     let mut about = model.provenance().clone();
@@ -93,7 +93,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let model = model.with_provenance(about);
     model.save(&arguments.output).map_err(Error::from)?;
     let mut text = describe(&model, &counts, seconds);
-    if quality::in_one_plane(&pairs) {
+    if quality::in_one_plane(pairs) {
         text.push_str(ONE_PLANE);
     }
     text.push_str(&albedo_of(&model)?);

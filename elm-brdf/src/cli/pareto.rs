@@ -270,7 +270,7 @@ fn of_materials(arguments: &Arguments) -> Result<Subject, Failure> {
         let pairs = &samples.directions;
         let folds = Folds::new(pairs.len(), arguments.folds, arguments.seed).map_err(usage)?;
         problems.extend((0..arguments.folds).map(|fold| {
-            Problem::split(&pairs, samples.values.view(), |row| {
+            Problem::split(pairs, samples.values.view(), |row| {
                 folds.of_row(row) == fold
             })
         }));

@@ -57,8 +57,8 @@ pub struct BrdfParams {
 /// let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
 /// let samples = data.samples(0).ok_or("no such material")?;
 /// let pairs = &samples.directions;
-/// let model = BrdfParams::paper(50).fit(&pairs, samples.values.view())?;
-/// assert_eq!(model.eval(&pairs)?.dim(), (205, 3));
+/// let model = BrdfParams::paper(50).fit(pairs, samples.values.view())?;
+/// assert_eq!(model.eval(pairs)?.dim(), (205, 3));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -78,7 +78,7 @@ use problem::Problem;
 /// let samples = data.samples(0).ok_or("no such material")?;
 /// let pairs = &samples.directions;
 /// let tuned = Tuned { neurons: Some(60), ..Tuned::default() };
-/// let model = tuned.fit_model(&pairs, samples.values.view())?;
+/// let model = tuned.fit_model(pairs, samples.values.view())?;
 /// assert_eq!(model.network().hidden().neurons(), 60);
 /// println!("{} numbers, held-out {:?}", model.stored_floats(), model.provenance().held_out);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

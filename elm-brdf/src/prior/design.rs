@@ -108,12 +108,12 @@ mod tests {
             neurons: 60,
             ..PriorParams::default()
         };
-        let prior = params.build(&pairs, values.view()).unwrap();
-        let whole = prior.design(&pairs, 205).unwrap();
+        let prior = params.build(pairs, values.view()).unwrap();
+        let whole = prior.design(pairs, 205).unwrap();
         let mut sorted = whole.clone();
         sorted.sort_unstable();
         assert_eq!(sorted, (0..205).collect::<Vec<_>>());
-        assert_eq!(prior.design(&pairs, 9).unwrap(), whole[..9]);
-        assert!(prior.design(&pairs, 206).is_err());
+        assert_eq!(prior.design(pairs, 9).unwrap(), whole[..9]);
+        assert!(prior.design(pairs, 206).is_err());
     }
 }

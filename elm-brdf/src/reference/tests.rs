@@ -39,9 +39,7 @@ fn directions(count: usize) -> Vec<DirectionPair> {
 }
 
 fn measured(pairs: &[DirectionPair], model: impl Fn(&Cosines) -> f64) -> Array2<f64> {
-    let value = |pair: &DirectionPair| {
-        Cosines::of_vectors(pair.incident, pair.outgoing).map_or(0.0, |angles| model(&angles))
-    };
+    let value = |pair: &DirectionPair| Cosines::of(pair).map_or(0.0, |angles| model(&angles));
     Array2::from_shape_fn((pairs.len(), 1), |(row, _)| value(&pairs[row]))
 }
 

@@ -92,9 +92,7 @@ impl Analytic {
         let above: Vec<(usize, Cosines)> = pairs
             .iter()
             .enumerate()
-            .filter_map(|(row, pair)| {
-                Some((row, Cosines::of(pair)?))
-            })
+            .filter_map(|(row, pair)| Some((row, Cosines::of(pair)?)))
             .collect();
         let angles: Vec<Cosines> = above.iter().map(|&(_, angles)| angles).collect();
         let problem = Problem::new(self, &angles);

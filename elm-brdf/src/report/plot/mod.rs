@@ -323,12 +323,12 @@ mod tests {
             })
             .collect();
         let values = &data.materials[1].values;
-        let model = Analytic::GgxLambert.fit(&pairs, values.view()).unwrap();
+        let model = Analytic::GgxLambert.fit(pairs, values.view()).unwrap();
         let panel = Panel {
             name: "a panel".to_owned(),
             model: &model,
             channels: 0..3,
-            pairs: &pairs,
+            pairs,
             measured: values.view(),
         };
         let dir = tempfile::tempdir().unwrap();
