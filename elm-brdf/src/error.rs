@@ -94,6 +94,7 @@ pub enum Error {
     #[error(transparent)]
     Export(#[from] crate::export::error::ExportError),
     /// A scene could not be read or rendered.
+    #[cfg(feature = "render")]
     #[error(transparent)]
     Scene(#[from] elm_brdf_render::Error),
     /// So many folds are impossible.

@@ -7,8 +7,11 @@
 //!
 //! Data run one way: measurements ([`elm_datasets`]) to network inputs ([`features`]) and targets
 //! ([`link`]), through a network ([`elm`]) to a reflectance model ([`model`]), which
-//! cross-validation ([`protocol`]) judges beside what the paper printed ([`published`]), as a
-//! [`report`].
+//! cross-validation ([`protocol`]) judges beside what the paper printed ([`published`]).
+//!
+//! Of the features `cli` (the program `elm-brdf`, default) brings `report` (results as tables, files
+//! and pictures) and `render` (scenes with learnt materials); without it the library knows no command
+//! line, picture or scene. `fetch` adds the command that asks for the CUReT files over HTTP.
 //!
 //! ```
 //! use elm_brdf::{model::BrdfParams, protocol};
@@ -27,6 +30,7 @@
 
 pub mod albedo;
 pub mod batch;
+#[cfg(feature = "cli")]
 pub mod cli;
 mod error;
 pub mod export;
@@ -35,6 +39,7 @@ pub mod features;
 pub mod fetch;
 mod file;
 pub mod fit;
+#[cfg(feature = "render")]
 pub mod gallery;
 pub mod link;
 pub mod metrics;
@@ -46,12 +51,16 @@ pub mod published;
 pub mod quality;
 pub mod recipes;
 pub mod reference;
+#[cfg(feature = "report")]
 pub mod report;
 mod scales;
+#[cfg(feature = "render")]
 pub mod scene_materials;
+#[cfg(feature = "render")]
 pub mod scenes;
 mod streams;
 
 /// The renderer.
+#[cfg(feature = "render")]
 pub use elm_brdf_render as render;
 pub use error::{Error, Result};

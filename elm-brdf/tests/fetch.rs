@@ -1,6 +1,5 @@
 //! `elm-brdf fetch curet` against a server on this machine. The database's own host is not asked.
 
-#![cfg(feature = "fetch")]
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 mod support;
