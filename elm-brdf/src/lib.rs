@@ -29,6 +29,7 @@
 #![forbid(unsafe_code)]
 
 pub mod albedo;
+pub mod baselines;
 pub mod batch;
 #[cfg(feature = "cli")]
 pub mod cli;
@@ -50,7 +51,7 @@ pub mod protocol;
 pub mod published;
 pub mod quality;
 pub mod recipes;
-pub mod reference;
+pub mod registry;
 #[cfg(feature = "report")]
 pub mod report;
 mod scales;

@@ -12,6 +12,7 @@ use elm_datasets::scattered::{self, AngleUnit};
 use elm_datasets::{Format, Invalid, Measurements, OpenOptions, Samples, curet, synthetic};
 use serde::Deserialize;
 
+use crate::baselines;
 use crate::batch::Packed;
 use crate::error::{Error, Result};
 use crate::export::check_precision;
@@ -20,7 +21,6 @@ use crate::fit::{Model, boxed};
 use crate::link::Link;
 use crate::model::BrdfModel;
 use crate::recipes::{self, Recipe};
-use crate::reference;
 
 /// A scene whose materials are described by [`MaterialTable`]s.
 pub type Scene = elm_brdf_render::Scene<MaterialTable>;
@@ -50,7 +50,7 @@ pub struct MaterialTable {
     /// What to do with negative values in one: `clamp` (if not given), `keep` or `drop`.
     pub invalid: Option<String>,
     /// What is fitted to measurements: `elm` (if not given), `interpolation`, which passes through
-    /// them, or one of the names of [`reference::Analytic`].
+    /// them, or one of the names of [`baselines::Analytic`].
     pub fit: Option<String>,
     /// Neurons of a network that is fitted.
     pub neurons: Option<usize>,
@@ -171,23 +171,23 @@ impl Library {
         let (method, how) = match table.fit.as_deref() {
             None | Some("elm") => ((self.network)(table.neurons), "ELM fitted to".to_owned()),
             Some("interpolation") => {
-                let interpolation = reference::RadialBasis {
+                let interpolation = baselines::RadialBasis {
                     features: Features::ReciprocalCosines,
                     link: Link::default_log(),
-                    radial: reference::Radial::ThinPlate,
-                    smoothing: reference::Smoothing::Exact,
+                    radial: baselines::Radial::ThinPlate,
+                    smoothing: baselines::Smoothing::Exact,
                 };
                 (boxed(interpolation), "interpolated".to_owned())
             }
             Some(name) => {
-                let all = reference::Analytic::ALL;
+                let all = baselines::Analytic::ALL;
                 let family = all.into_iter().find(|family| family.name() == name);
                 let family = family.ok_or_else(|| Error::UnknownName {
                     what: "fit",
                     name: name.to_owned(),
                     expected: format!(
                         "elm, interpolation, {}",
-                        all.map(reference::Analytic::name).join(", ")
+                        all.map(baselines::Analytic::name).join(", ")
                     ),
                 })?;
                 (boxed(family), format!("{name} fitted to"))

@@ -7,8 +7,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use elm_brdf::baselines::Nbrdf;
 use elm_brdf::metrics::Metrics;
-use elm_brdf::reference::Nbrdf;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::{DirectionPair, cartesian};
 use elm_datasets::{OpenOptions, open};

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use elm_brdf::albedo;
 use elm_brdf::model::Tuned;
-use elm_brdf::reference;
+use elm_brdf::registry;
 use elm_datasets::Brdf;
 use elm_datasets::{Invalid, MaterialId, OpenOptions, Samples, curet, open, paint, synthetic};
 
@@ -34,9 +34,9 @@ fn largest(brdf: &dyn Brdf) -> elm_brdf::Result<(f64, f64)> {
 }
 
 fn nearest() -> Result<Box<elm_brdf::fit::AnyFit>, Box<dyn Error>> {
-    let found = reference::all()
+    let found = registry::baselines()
         .into_iter()
-        .find(|reference| reference.full_name() == "inverse-distance-5 (cosines, log)");
+        .find(|entry| entry.full_name() == "inverse-distance-5 (cosines, log)");
     Ok(found.ok_or("no such reference")?.method)
 }
 

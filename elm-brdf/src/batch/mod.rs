@@ -5,7 +5,7 @@
 //! come. [`Packed`] is a [`BrdfModel`](crate::model::BrdfModel) made ready for this one: lanes of the
 //! vector unit are rows, the input scaling is folded into the weights, blocks of rows stay in the
 //! first-level cache from end to end. The published neural model,
-//! [`Nbrdf`](crate::reference::Nbrdf), is evaluated by the same layers, so that comparing the two
+//! [`Nbrdf`](crate::baselines::Nbrdf), is evaluated by the same layers, so that comparing the two
 //! compares the models.
 //!
 //! Values do not depend on which pairs are evaluated together. Between vector units they differ by

@@ -13,7 +13,7 @@ use super::samples::{Material, Reading};
 use super::{Failure, models, overwrite, print};
 use crate::fit::AnyFit;
 use crate::protocol::{Folds, MaterialScores, cross_validate, cross_validate_samples};
-use crate::reference::Reference;
+use crate::registry::{self, ModelEntry};
 use crate::report::plot::{self, Shown};
 use crate::report::{Comparison, Data, Entry, Format, Words};
 use elm_datasets::geometry::DirectionPair;
@@ -99,7 +99,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut entries = Vec::new();
     let mut best: Option<(f64, String, Vec<MaterialScores>)> = None;
     for (index, named) in names.iter().enumerate() {
-        if named.name == models::POOLED && matches!(subject, Subject::Samples(_)) {
+        if named.name == registry::POOLED && matches!(subject, Subject::Samples(_)) {
             // One material has no others.
             progress.inc(seeds.len() as u64);
             continue;
@@ -109,9 +109,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         for &seed in &seeds {
             let model = models::select(&arguments.models, seed)?
                 .swap_remove(index)
-                .affordable(seed);
+                .with_row_limit(seed);
             let folds = Folds::new(subject.rows(), arguments.folds, seed).map_err(usage)?;
-            runs.push(if model.name == models::POOLED {
+            runs.push(if model.name == registry::POOLED {
                 subject.pooled(seed, arguments.reading.invalid, &folds)?
             } else {
                 subject.cross_validate(model.method.as_ref(), &folds)?
@@ -212,7 +212,7 @@ impl Subject {
 
     fn entry(
         &self,
-        model: &Reference,
+        model: &ModelEntry,
         fitting: Instant,
         folds: usize,
         runs: &[Vec<MaterialScores>],
@@ -229,7 +229,7 @@ impl Subject {
             network: model.network,
         };
         let train = self.rows() - self.rows() / folds;
-        let most = model.growth.most_rows().unwrap_or(train);
+        let most = model.cost.max_rows().unwrap_or(train);
         let floats = match self.first() {
             // Fitted to no more than a cross-validation fits it to, at little cost.
             Some((pairs, values)) => {

@@ -1,40 +1,14 @@
-//! The models that commands know by name.
+//! Models by the names that were typed.
 
-use elm::solve::Ridge;
-use elm::{Activation, ElmParams};
 use elm_datasets::{Invalid, Measurements};
 
 use super::Failure;
 use super::common::usage;
 use super::data::Source;
 use crate::error::Error;
-use crate::features::Features;
-use crate::fit::boxed;
-use crate::link::Link;
-use crate::model::{BrdfParams, Tuned};
 use crate::prior::PriorParams;
 use crate::protocol::{Folds, MaterialScores, cross_validate_pooled};
-use crate::reference::{self, Growth, Reference};
-
-/// Everything chosen by held-out errors, each material by itself.
-const TUNED: &str = "elm (tuned)";
-/// The same with a prior from the other materials.
-pub(super) const POOLED: &str = "elm (prior)";
-
-fn tuned(name: &str, seed: u64) -> Reference {
-    Reference {
-        name: name.to_owned(),
-        // Chosen for each material.
-        features: None,
-        link: Some(Link::default_log()),
-        growth: Growth::Linear,
-        network: true,
-        method: boxed(Tuned {
-            seed,
-            ..Tuned::default()
-        }),
-    }
-}
+use crate::registry::{self, ModelEntry};
 
 /// Each material of `data` with a prior from all others that its source has.
 pub(super) fn cross_validate_with_prior(
@@ -53,18 +27,17 @@ pub(super) fn cross_validate_with_prior(
     Ok(cross_validate_pooled(&params, &pool, data, folds, done)?)
 }
 
-fn all(seed: u64) -> Vec<Reference> {
-    reference::all().into_iter().chain(networks(seed)).collect()
-}
-
 /// The model of this name, or of this name with its inputs and target in brackets.
-pub(super) fn named(name: &str, seed: u64) -> Result<Reference, Failure> {
-    let mut found = all(seed);
+pub(super) fn named(name: &str, seed: u64) -> Result<ModelEntry, Failure> {
+    let mut found = registry::all(seed);
     found.retain(|model| model.name == name || model.full_name() == name);
     match found.len() {
         1 => Ok(found.swap_remove(0)),
         0 => {
-            let known: Vec<String> = all(seed).iter().map(Reference::full_name).collect();
+            let known: Vec<String> = registry::all(seed)
+                .iter()
+                .map(ModelEntry::full_name)
+                .collect();
             Err(usage(Error::UnknownName {
                 what: "model",
                 name: name.to_owned(),
@@ -72,7 +45,7 @@ pub(super) fn named(name: &str, seed: u64) -> Result<Reference, Failure> {
             }))
         }
         count => {
-            let found: Vec<String> = found.iter().map(Reference::full_name).collect();
+            let found: Vec<String> = found.iter().map(ModelEntry::full_name).collect();
             Err(usage(format_args!(
                 "model '{name}' is {count}, expected one of: {}",
                 found.join(", ")
@@ -82,13 +55,13 @@ pub(super) fn named(name: &str, seed: u64) -> Result<Reference, Failure> {
 }
 
 /// The models of these names: with the inputs and target in brackets that a table prints, or on all the inputs and targets that they come with.
-pub(super) fn select(list: &str, seed: u64) -> Result<Vec<Reference>, Failure> {
-    let mut models = all(seed);
+pub(super) fn select(list: &str, seed: u64) -> Result<Vec<ModelEntry>, Failure> {
+    let mut models = registry::all(seed);
     if list.trim() == "all" {
         return Ok(models);
     }
     let names = outside_brackets(list);
-    let is = |model: &Reference, name: &str| model.name == name || model.full_name() == name;
+    let is = |model: &ModelEntry, name: &str| model.name == name || model.full_name() == name;
     if let Some(&unknown) = names
         .iter()
         .find(|&&name| !models.iter().any(|model| is(model, name)))
@@ -118,46 +91,4 @@ fn outside_brackets(list: &str) -> Vec<&str> {
         c == ',' && depth == 0
     });
     parts.map(str::trim).collect()
-}
-
-/// The paper's network, and the same idea with inputs, target and ridge that suit the task.
-fn networks(seed: u64) -> [Reference; 4] {
-    let reference = |name: &str, params: BrdfParams| Reference {
-        name: name.to_owned(),
-        features: Some(params.features),
-        link: Some(params.link),
-        growth: Growth::Linear,
-        network: true,
-        method: boxed(params),
-    };
-    [
-        reference(
-            "elm (paper)",
-            // As 'reproduce' has it.
-            BrdfParams::paper(50).seed(seed),
-        ),
-        reference(
-            "elm (200 sine, ridge)",
-            BrdfParams {
-                features: Features::Cosines,
-                link: Link::default_log(),
-                network: ElmParams::new(200)
-                    .seed(seed)
-                    .activation(Activation::Sine)
-                    .solver(Ridge::leave_one_out()),
-            },
-        ),
-        tuned(TUNED, seed),
-        // What is fitted to count its numbers: a network without the prior, of as many neurons.
-        Reference {
-            features: Some(Features::SumDifference),
-            method: boxed(Tuned {
-                features: Some(Features::SumDifference),
-                neurons: Some(PriorParams::default().neurons),
-                seed,
-                ..Tuned::default()
-            }),
-            ..tuned(POOLED, seed)
-        },
-    ]
 }

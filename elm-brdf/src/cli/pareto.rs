@@ -9,12 +9,13 @@ use super::common::{hint, one_of, progress, usage};
 use super::data::Source;
 use super::samples::Reading;
 use super::{Failure, overwrite, print};
+use crate::baselines::Nbrdf;
 use crate::error::Error;
 use crate::file;
 use crate::metrics::Metric;
 use crate::pareto::{self, Given, Point, Problem};
 use crate::protocol::Folds;
-use crate::reference::Nbrdf;
+use crate::registry::{self, Candidate};
 use crate::report::plot;
 
 /// Weigh run time against error: for every model that can be fitted, the held-out error, the time to
@@ -147,8 +148,8 @@ fn refuse_inputs(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-fn candidates(arguments: &Arguments, metric: Metric) -> Result<Vec<pareto::Candidate>, Failure> {
-    let mut all = pareto::all(metric, arguments.seed);
+fn candidates(arguments: &Arguments, metric: Metric) -> Result<Vec<Candidate>, Failure> {
+    let mut all = registry::candidates(metric, arguments.seed);
     if let Some(list) = &arguments.models {
         let parts: Vec<&str> = list.split(',').map(str::trim).collect();
         let is_unknown =

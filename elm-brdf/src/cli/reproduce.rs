@@ -14,6 +14,7 @@ use super::{Failure, models, overwrite, print};
 use crate::fit::{AnyFit, boxed};
 use crate::model::{BrdfParams, ScaledOnce};
 use crate::protocol::{Folds, MaterialScores, cross_validate};
+use crate::registry;
 use crate::report::plot::{self, Shown};
 use crate::report::{Format, Protocol, Report, Seconds};
 
@@ -113,7 +114,7 @@ enum Model {
     Paper(Box<BrdfParams>, bool),
     /// A model that chooses its own settings.
     Named(String),
-    /// [`models::POOLED`].
+    /// [`registry::POOLED`].
     WithPrior,
 }
 
@@ -138,7 +139,7 @@ impl Model {
             return Ok(Self::WithPrior);
         }
         let model = models::named(&arguments.model, arguments.seed)?;
-        Ok(if model.name == models::POOLED {
+        Ok(if model.name == registry::POOLED {
             Self::WithPrior
         } else {
             Self::Named(model.full_name())
@@ -190,7 +191,7 @@ impl Model {
             Self::Named(_) | Self::WithPrior => {
                 let name = match self {
                     Self::Named(name) => name,
-                    _ => models::POOLED,
+                    _ => registry::POOLED,
                 };
                 let model = models::named(name, arguments.seed)?;
                 protocol.features = model.features.map(|features| features.name().to_owned());

@@ -4,10 +4,10 @@ use std::any::Any;
 use std::hint::black_box;
 use std::time::Instant;
 
+use crate::baselines::Nbrdf;
 use crate::batch::{Batched, Columns, Packed, Precision, Real};
 use crate::error::Result;
 use crate::fit::Model;
-use crate::reference::Nbrdf;
 use elm_datasets::geometry::DirectionPair;
 
 /// Pairs in a batch: its directions and values stay in the second-level cache.

@@ -8,7 +8,6 @@
 //!
 //! A model is on the **front** where no other is both as exact and as fast, and better in one.
 
-mod candidates;
 mod clock;
 
 use std::time::Instant;
@@ -16,13 +15,12 @@ use std::time::Instant;
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
-pub use candidates::{Candidate, all};
-
 use crate::batch::Packed;
 use crate::error::Result;
 use crate::fit::Model;
 use crate::metrics::{Metric, Metrics};
 use crate::model::BrdfModel;
+use crate::registry::Candidate;
 use elm_datasets::geometry::DirectionPair;
 
 /// Measurements to fit to, and others of the same material that judge.

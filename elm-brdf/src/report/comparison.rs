@@ -9,7 +9,7 @@ use super::{Data, Format, json, mean, paper};
 use crate::error::{Error, Result};
 use crate::metrics::Metrics;
 use crate::protocol::{MaterialScores, Scores};
-use crate::reference::full_name;
+use crate::registry::full_name;
 
 /// Models cross-validated on the same folds, the smallest held-out error first. Its JSON form is
 /// this structure, field for field.
@@ -485,8 +485,8 @@ impl Comparison {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::baselines::Analytic;
     use crate::protocol::{Folds, cross_validate};
-    use crate::reference::Analytic;
     use elm_datasets::{Invalid, MaterialId, synthetic};
 
     fn comparison() -> Comparison {

@@ -297,8 +297,8 @@ fn round_step(length: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::baselines::Analytic;
     use crate::protocol::{Folds, cross_validate};
-    use crate::reference::Analytic;
     use elm_datasets::{Invalid, MaterialId, synthetic};
 
     #[test]

@@ -1,8 +1,11 @@
-//! What holds for all references.
+//! What holds for all baselines.
 
 use super::*;
 use crate::error::Error;
+use crate::features::Features;
 use crate::fit::Fit;
+use crate::link::Link;
+use crate::registry::{ModelEntry, with_candidates};
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use elm_datasets::Brdf;
 use elm_datasets::geometry::{DirectionPair, cartesian};
@@ -10,9 +13,9 @@ use elm_datasets::lobes::{self, Cosines};
 use ndarray::{Array2, Axis, array};
 use std::f64::consts::{FRAC_PI_4, PI};
 
-/// Every reference, with few candidates for the length scales: what is checked here holds for any
+/// Every baseline, with few candidates for the length scales: what is checked here holds for any
 /// of them.
-fn all() -> Vec<Reference> {
+fn all() -> Vec<ModelEntry> {
     with_candidates(6)
 }
 

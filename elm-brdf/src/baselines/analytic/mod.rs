@@ -23,7 +23,7 @@ use elm_datasets::geometry::DirectionPair;
 /// ```
 /// use elm_datasets::Brdf;
 /// use elm_datasets::geometry::{DirectionPair, cartesian};
-/// use elm_brdf::reference::Analytic;
+/// use elm_brdf::baselines::Analytic;
 /// use ndarray::Array2;
 ///
 /// let pairs: Vec<DirectionPair> = (0..40)

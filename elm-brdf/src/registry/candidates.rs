@@ -1,12 +1,12 @@
-//! Every model that the project can fit.
+//! Every model that the project can fit, networks in many sizes.
 
 use elm::Activation;
 
+use super::baselines;
 use crate::fit::{AnyFit, boxed};
 use crate::metrics::Metric;
 use crate::model::{BrdfParams, Lean, Tuned};
 use crate::recipes::Joint;
-use crate::reference;
 
 /// A way to fit a model, with its name.
 pub struct Candidate {
@@ -19,9 +19,9 @@ pub struct Candidate {
 /// Sizes of networks.
 const NEURONS: [usize; 8] = [16, 24, 32, 40, 48, 64, 80, 128];
 
-/// Networks by size, function, and pruned or not; the paper's; the tuned one; and every reference.
+/// Networks by size, function, and pruned or not; the paper's; the tuned one; and every baseline.
 #[must_use]
-pub fn all(metric: Metric, seed: u64) -> Vec<Candidate> {
+pub fn candidates(metric: Metric, seed: u64) -> Vec<Candidate> {
     let mut all = Vec::new();
     for activation in [
         Activation::Relu,
@@ -58,11 +58,11 @@ pub fn all(metric: Metric, seed: u64) -> Vec<Candidate> {
         name: "elm (tuned)".to_owned(),
         method: boxed(Joint(tuned)),
     });
-    all.extend(reference::all().into_iter().map(|reference| {
-        let reference = reference.affordable(seed);
+    all.extend(baselines().into_iter().map(|baseline| {
+        let baseline = baseline.with_row_limit(seed);
         Candidate {
-            name: reference.full_name(),
-            method: reference.method,
+            name: baseline.full_name(),
+            method: baseline.method,
         }
     }));
     all

@@ -1,4 +1,4 @@
-//! Methods that take no more than so many measurements.
+//! Methods that are given a limited number of measurements.
 
 use ndarray::{ArrayView2, Axis};
 use rand::seq::index;
@@ -11,23 +11,23 @@ use elm_datasets::geometry::DirectionPair;
 /// A method that is fitted to a random subset where there are more measurements than it can
 /// afford: dense kernel matrices grow with the square of the rows, their decompositions with the
 /// cube.
-pub(crate) struct Thinned {
+pub(crate) struct Subsampled {
     pub(crate) method: Box<AnyFit>,
     /// The most measurements that it is given.
-    pub(crate) most: usize,
+    pub(crate) max_rows: usize,
     /// Seed of the subset.
     pub(crate) seed: u64,
 }
 
-impl Fit for Thinned {
+impl Fit for Subsampled {
     type Model = Box<dyn Model>;
 
     fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
-        if pairs.len() <= self.most || pairs.len() != values.nrows() {
+        if pairs.len() <= self.max_rows || pairs.len() != values.nrows() {
             return self.method.fit(pairs, values);
         }
         let mut random = generator(self.seed, streams::SUBSAMPLE);
-        let mut rows = index::sample(&mut random, pairs.len(), self.most).into_vec();
+        let mut rows = index::sample(&mut random, pairs.len(), self.max_rows).into_vec();
         rows.sort_unstable();
         let kept: Vec<DirectionPair> = rows.iter().map(|&row| pairs[row]).collect();
         self.method.fit(&kept, values.select(Axis(0), &rows).view())
@@ -37,10 +37,10 @@ impl Fit for Thinned {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::baselines::Neighbours;
     use crate::features::Features;
     use crate::fit::boxed;
     use crate::link::Link;
-    use crate::reference::Neighbours;
     use elm_datasets::Brdf;
     use elm_datasets::geometry::cartesian;
     use ndarray::Array2;
@@ -54,10 +54,14 @@ mod tests {
             })
             .collect();
         let values = Array2::from_shape_fn((50, 1), |(row, _)| row as f64);
-        let fit = |most, seed| {
+        let fit = |max_rows, seed| {
             let method = boxed(Neighbours::nearest(Features::Cosines, Link::Identity));
-            let thinned = Thinned { method, most, seed };
-            let model = thinned.fit(&pairs, values.view()).unwrap();
+            let subsampled = Subsampled {
+                method,
+                max_rows,
+                seed,
+            };
+            let model = subsampled.fit(&pairs, values.view()).unwrap();
             model.eval(&pairs).unwrap()
         };
         // The nearest neighbour gives back a row's own value where the row was kept.

@@ -1,0 +1,73 @@
+//! This project's networks.
+
+use elm::solve::Ridge;
+use elm::{Activation, ElmParams};
+
+use super::{CostClass, ModelEntry};
+use crate::features::Features;
+use crate::fit::boxed;
+use crate::link::Link;
+use crate::model::{BrdfParams, Tuned};
+use crate::prior::PriorParams;
+
+/// Everything chosen by held-out errors, each material by itself.
+const TUNED: &str = "elm (tuned)";
+/// The same with a prior from the other materials.
+pub const POOLED: &str = "elm (prior)";
+
+fn tuned(name: &str, seed: u64) -> ModelEntry {
+    ModelEntry {
+        name: name.to_owned(),
+        // Chosen for each material.
+        features: None,
+        link: Some(Link::default_log()),
+        cost: CostClass::Linear,
+        network: true,
+        method: boxed(Tuned {
+            seed,
+            ..Tuned::default()
+        }),
+    }
+}
+
+/// The paper's network, and the same idea with inputs, target and ridge that suit the task.
+pub(super) fn networks(seed: u64) -> [ModelEntry; 4] {
+    let entry = |name: &str, params: BrdfParams| ModelEntry {
+        name: name.to_owned(),
+        features: Some(params.features),
+        link: Some(params.link),
+        cost: CostClass::Linear,
+        network: true,
+        method: boxed(params),
+    };
+    [
+        entry(
+            "elm (paper)",
+            // As 'reproduce' has it.
+            BrdfParams::paper(50).seed(seed),
+        ),
+        entry(
+            "elm (200 sine, ridge)",
+            BrdfParams {
+                features: Features::Cosines,
+                link: Link::default_log(),
+                network: ElmParams::new(200)
+                    .seed(seed)
+                    .activation(Activation::Sine)
+                    .solver(Ridge::leave_one_out()),
+            },
+        ),
+        tuned(TUNED, seed),
+        // What is fitted to count its numbers: a network without the prior, of as many neurons.
+        ModelEntry {
+            features: Some(Features::SumDifference),
+            method: boxed(Tuned {
+                features: Some(Features::SumDifference),
+                neurons: Some(PriorParams::default().neurons),
+                seed,
+                ..Tuned::default()
+            }),
+            ..tuned(POOLED, seed)
+        },
+    ]
+}
