@@ -5,7 +5,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use elm_brdf::fit::Fit;
-use elm_brdf::model::{BrdfModel, BrdfParams, ScaledOnce};
+use elm_brdf::model::{BrdfModel, BrdfParams, GlobalScaling};
 use elm_brdf::protocol::{Folds, cross_validate};
 use elm_datasets::{Invalid, MaterialId, Measurements, synthetic};
 use ndarray::{Axis, concatenate};
@@ -31,7 +31,7 @@ fn reproduce(criterion: &mut Criterion) {
         bencher.iter(|| scores(black_box(&together), &folds));
     });
     group.bench_function("all materials together, inputs scaled once", |bencher| {
-        let Ok(once) = ScaledOnce::new(BrdfParams::paper(50)) else {
+        let Ok(once) = GlobalScaling::new(BrdfParams::paper(50)) else {
             return;
         };
         bencher.iter(|| {
@@ -50,7 +50,7 @@ fn reproduce(criterion: &mut Criterion) {
         ("fits, fold by fold", false),
         ("fits, inputs scaled once", true),
     ] {
-        let Ok(scaled) = ScaledOnce::new(BrdfParams::paper(50)) else {
+        let Ok(scaled) = GlobalScaling::new(BrdfParams::paper(50)) else {
             return;
         };
         let plain = BrdfParams::paper(50);

@@ -14,14 +14,14 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use elm_brdf::render::{Bitmap, Options, Rendering, Savings};
-use elm_brdf::scene_materials::{Library, Scene, Sheet};
+use elm_brdf::render::{Bitmap, Optimizations, Options, Rendering};
+use elm_brdf::scene_materials::{Scene, SceneMaterialLoader, Sheet};
 use elm_brdf::scenes::{NAMES, builtin};
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 fn main() -> Outcome<()> {
-    let library = Library::new(std::env::args_os().nth(1).map(PathBuf::from));
+    let library = SceneMaterialLoader::new(std::env::args_os().nth(1).map(PathBuf::from));
     growth(&library)?;
     savings(&library, None)?;
     savings(&library, Some((320, 180)))
@@ -31,7 +31,7 @@ fn main() -> Outcome<()> {
 fn timed(
     times: usize,
     sheet: &Sheet,
-    library: &Library,
+    library: &SceneMaterialLoader,
     options: Options,
 ) -> Outcome<(Rendering, f64)> {
     let mut seconds = Vec::new();
@@ -61,9 +61,9 @@ fn lights(count: usize, width: u32, height: u32) -> Outcome<Sheet> {
     Ok(Scene::parse(&text, "lights".as_ref())?.into())
 }
 
-fn growth(library: &Library) -> Outcome<()> {
+fn growth(library: &SceneMaterialLoader) -> Outcome<()> {
     let options = Options {
-        savings: Savings::LOSSLESS,
+        savings: Optimizations::LOSSLESS,
         threads: 1,
     };
     println!("pixels  lights  threads  seconds  evaluations  ns per pixel sample and light");
@@ -88,10 +88,10 @@ fn growth(library: &Library) -> Outcome<()> {
 }
 
 /// One thread and two by turns, and the median of the ratios.
-fn threads(library: &Library) -> Outcome<()> {
+fn threads(library: &SceneMaterialLoader) -> Outcome<()> {
     let sheet = lights(4, 512, 512)?;
     let with = |threads| -> Outcome<f64> {
-        let savings = Savings::LOSSLESS;
+        let savings = Optimizations::LOSSLESS;
         Ok(timed(1, &sheet, library, Options { savings, threads })?.1)
     };
     let mut gains = Vec::new();
@@ -107,7 +107,7 @@ fn threads(library: &Library) -> Outcome<()> {
 }
 
 /// Brute force against all savings on every built-in scene, at its own size or about another.
-fn savings(library: &Library, size: Option<(u32, u32)>) -> Outcome<()> {
+fn savings(library: &SceneMaterialLoader, size: Option<(u32, u32)>) -> Outcome<()> {
     println!("\nscene               size  evaluations     time  mean steps  most steps  lossless");
     let (mut evaluations, mut times, mut count) = (0.0, 0.0, 0.0);
     for name in NAMES {
@@ -119,9 +119,9 @@ fn savings(library: &Library, size: Option<(u32, u32)>) -> Outcome<()> {
             let threads = 1;
             timed(1, &sheet, library, Options { savings, threads })
         };
-        let (brute, slow) = with(Savings::NONE)?;
-        let (saved, fast) = with(Savings::ALL)?;
-        let (lossless, _) = with(Savings::LOSSLESS)?;
+        let (brute, slow) = with(Optimizations::NONE)?;
+        let (saved, fast) = with(Optimizations::ALL)?;
+        let (lossless, _) = with(Optimizations::LOSSLESS)?;
         let same = match lossless.pixels == brute.pixels {
             true => "same bits",
             false => "DIFFERS",

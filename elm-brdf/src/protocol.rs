@@ -291,7 +291,7 @@ impl<'a> Group<'a> {
         });
         let rows_of = |fold: usize| (0..rows).partition(|&row| labels[row] == fold);
         let split: Vec<(Vec<usize>, Vec<usize>)> = (0..folds.count).map(rows_of).collect();
-        let exchanged = quality::exchanged(pairs);
+        let reciprocal_pairs = quality::reciprocal_pairs(pairs);
         let scores = values
             .columns()
             .into_iter()
@@ -322,7 +322,7 @@ impl<'a> Group<'a> {
                     held_out: all,
                     held_out_fold_mean: Metrics::mean(&each_fold).unwrap_or(all),
                     held_out_unsaturated: unsaturated.metrics()?,
-                    noise_floor: NoiseFloor::of(&exchanged, values),
+                    noise_floor: NoiseFloor::of(&reciprocal_pairs, values),
                     saturated,
                 })
             });

@@ -11,9 +11,9 @@ use elm_datasets::geometry::{DirectionPair, dot};
 const TOLERANCE: f64 = 1e-4;
 
 /// A saturated camera's values pile up within this share of the largest radiance.
-const PILE: f64 = 0.1;
+const CLUSTER_WIDTH: f64 = 0.1;
 /// The fewest measurements that make a pile.
-const LEAST_PILE: usize = 3;
+const MIN_CLUSTER: usize = 3;
 /// A highlight is at least so many times the median.
 const HIGHLIGHT: f64 = 2.0;
 /// By how much, as a factor, the cosines of the light in a pile must differ.
@@ -32,17 +32,17 @@ pub struct NoiseFloor {
 }
 
 impl NoiseFloor {
-    /// Of one channel of BRDF values in 1/sr; `None` without pairs, or where `exchanged` does not
+    /// Of one channel of BRDF values in 1/sr; `None` without pairs, or where `reciprocal_pairs` does not
     /// belong to these values.
     #[must_use]
-    pub fn of(exchanged: &[(usize, usize)], values: ArrayView1<'_, f64>) -> Option<Self> {
+    pub fn of(reciprocal_pairs: &[(usize, usize)], values: ArrayView1<'_, f64>) -> Option<Self> {
         let mut squares = 0.0;
-        for &(a, b) in exchanged {
+        for &(a, b) in reciprocal_pairs {
             squares += (values.get(a)? - values.get(b)?).powi(2);
         }
-        (!exchanged.is_empty()).then(|| Self {
-            sigma: (squares / (2.0 * exchanged.len() as f64)).sqrt(),
-            pairs: exchanged.len(),
+        (!reciprocal_pairs.is_empty()).then(|| Self {
+            sigma: (squares / (2.0 * reciprocal_pairs.len() as f64)).sqrt(),
+            pairs: reciprocal_pairs.len(),
         })
     }
 }
@@ -65,7 +65,7 @@ pub fn in_one_plane(pairs: &[DirectionPair]) -> bool {
 /// Directions that are their own exchange, with light and viewer equally far from the normal, say
 /// nothing about noise and are left out.
 #[must_use]
-pub fn exchanged(pairs: &[DirectionPair]) -> Vec<(usize, usize)> {
+pub fn reciprocal_pairs(pairs: &[DirectionPair]) -> Vec<(usize, usize)> {
     let near = |a: f64, b: f64| (a - b).abs() <= TOLERANCE;
     // By the light, so that few candidates are left for each.
     let mut order: Vec<usize> = (0..pairs.len()).collect();
@@ -116,15 +116,15 @@ pub fn saturated(pairs: &[DirectionPair], values: ArrayView1<'_, f64>) -> Vec<us
     let largest = rows().map(radiance).fold(0.0, f64::max);
     let highlights = rows().filter(|&row| values[row] >= HIGHLIGHT * median && values[row] > 0.0);
     let (top, rest): (Vec<usize>, Vec<usize>) =
-        highlights.partition(|&row| radiance(row) >= (1.0 - PILE) * largest);
+        highlights.partition(|&row| radiance(row) >= (1.0 - CLUSTER_WIDTH) * largest);
     let below = rest.into_iter();
-    let below = below.filter(|&row| radiance(row) >= (1.0 - 2.0 * PILE) * largest);
+    let below = below.filter(|&row| radiance(row) >= (1.0 - 2.0 * CLUSTER_WIDTH) * largest);
     let cosines = || top.iter().map(|&row| pairs[row].incident[2]);
     let (least, most) = (
         cosines().fold(f64::INFINITY, f64::min),
         cosines().fold(0.0, f64::max),
     );
-    let piled = top.len() >= LEAST_PILE && top.len() >= below.count() && most >= SPAN * least;
+    let piled = top.len() >= MIN_CLUSTER && top.len() >= below.count() && most >= SPAN * least;
     if piled { top } else { Vec::new() }
 }
 
@@ -173,14 +173,14 @@ mod tests {
             pair(0.9, 0.3, 1.3),
             pair(0.9, 0.3, 1.0),
         ];
-        assert_eq!(exchanged(&measured), [(0, 2), (0, 4)]);
-        assert!(exchanged(&[]).is_empty());
+        assert_eq!(reciprocal_pairs(&measured), [(0, 2), (0, 4)]);
+        assert!(reciprocal_pairs(&[]).is_empty());
     }
 
     #[test]
     fn the_rig_has_thirty_exchanged_pairs() {
         // Counted on the database's own table of directions by an independent program.
-        assert_eq!(exchanged(&rig::directions()).len(), 30);
+        assert_eq!(reciprocal_pairs(&rig::directions()).len(), 30);
     }
 
     #[test]
@@ -200,7 +200,7 @@ mod tests {
         let data = synthetic::measurements(1, &[MaterialId::new(5).unwrap()], Invalid::Keep);
         let pairs = &data.directions;
         let red = data.materials[0].values.column(0);
-        let floor = NoiseFloor::of(&exchanged(pairs), red).unwrap();
+        let floor = NoiseFloor::of(&reciprocal_pairs(pairs), red).unwrap();
         let level = (red.mapv(|v| v * v).sum() / red.len() as f64).sqrt();
         // 30 pairs know a deviation to 1 / sqrt(60), 13 %; three times that.
         assert!(

@@ -87,7 +87,7 @@ pub struct Fitted {
 
 /// Models fitted to CUReT's files, to the stand-in or to files of one's own, saved models, measured
 /// tables, and formulas. What was made once is used again for the same table.
-pub struct Library {
+pub struct SceneMaterialLoader {
     /// Folder of CUReT's files; `None` for the stand-in.
     curet: Option<PathBuf>,
     /// What fits a network, `fit = "elm"`.
@@ -111,7 +111,7 @@ struct Made {
 /// The stand-in's seed.
 const STAND_IN_SEED: u64 = 1;
 
-impl Library {
+impl SceneMaterialLoader {
     /// With CUReT's files in a folder, or with the stand-in, and the networks of
     /// [`recipes::network`].
     #[must_use]
@@ -289,7 +289,7 @@ fn packed(model: Box<dyn Model>) -> Arc<dyn Brdf> {
     }
 }
 
-impl MaterialLoader<MaterialTable> for Library {
+impl MaterialLoader<MaterialTable> for SceneMaterialLoader {
     fn load(&self, table: &MaterialTable, dir: &Path) -> Result<LoadedMaterial, LoadError> {
         let untinted = MaterialTable {
             tint: None,

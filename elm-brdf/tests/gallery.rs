@@ -5,7 +5,7 @@
 #[path = "support/browser.rs"]
 mod browser;
 
-use elm_brdf::gallery::{self, Exhibit, Only, sphere};
+use elm_brdf::gallery::{self, GalleryItem, SingleMaterial, sphere};
 use elm_brdf::model::BrdfModel;
 use elm_brdf::recipes;
 use elm_brdf::render::{Bitmap, Options, render};
@@ -14,7 +14,7 @@ use elm_datasets::{Invalid, MaterialId, synthetic};
 /// Pixels across and down of what the page shows to this test.
 const SIZE: usize = 64;
 
-fn exhibits() -> Vec<Exhibit> {
+fn items() -> Vec<GalleryItem> {
     // Rough, shiny, and in between.
     [5, 7, 61]
         .map(|id| {
@@ -24,7 +24,7 @@ fn exhibits() -> Vec<Exhibit> {
             let brdf = recipes::network(None)
                 .fit(&samples.directions, samples.values.view())
                 .unwrap();
-            Exhibit {
+            GalleryItem {
                 name: format!("</script> {id} & \"quoted\""),
                 origin: "a test".to_owned(),
                 model: BrdfModel::of(&*brdf).unwrap().clone(),
@@ -36,7 +36,7 @@ fn exhibits() -> Vec<Exhibit> {
 
 /// What the page says that it shows, and its pixels.
 struct Shown {
-    exhibit: usize,
+    item: usize,
     light: [f64; 3],
     viewer: [f64; 3],
     up: [f64; 3],
@@ -48,7 +48,7 @@ fn shown(message: &str) -> Shown {
     let words: Vec<&str> = message.split(' ').collect();
     let vector = |start: usize| [0, 1, 2].map(|c| words[start + c].parse().unwrap());
     Shown {
-        exhibit: words[1].parse().unwrap(),
+        item: words[1].parse().unwrap(),
         light: vector(3),
         viewer: vector(7),
         up: vector(11),
@@ -59,12 +59,12 @@ fn shown(message: &str) -> Shown {
 #[test]
 fn the_page_shades_its_sphere_as_the_renderer_does_and_follows_the_mouse() {
     let dir = tempfile::tempdir().unwrap();
-    let exhibits = exhibits();
-    gallery::write(dir.path(), &exhibits, 32, |_| {}).unwrap();
+    let items = items();
+    gallery::write(dir.path(), &items, 32, |_| {}).unwrap();
     let index = dir.path().join("index.html");
     assert_eq!(
         std::fs::read_dir(dir.path()).unwrap().count(),
-        1 + exhibits.len()
+        1 + items.len()
     );
     let page = std::fs::read_to_string(&index).unwrap();
     assert!(
@@ -96,7 +96,7 @@ fn the_page_shades_its_sphere_as_the_renderer_does_and_follows_the_mouse() {
     }
     assert_eq!(images.as_deref(), Some("images 3 broken 0"));
     // Each exhibit, then the last with the light moved, then with the view turned.
-    assert_eq!(pictures.len(), exhibits.len() + 2);
+    assert_eq!(pictures.len(), items.len() + 2);
     let [.., before, lit, turned] = &*pictures else {
         panic!("too few pictures");
     };
@@ -107,14 +107,14 @@ fn the_page_shades_its_sphere_as_the_renderer_does_and_follows_the_mouse() {
 
     for picture in &pictures {
         let Shown {
-            exhibit,
+            item,
             light,
             viewer,
             up,
             pixels,
         } = picture;
         let scene = sphere(SIZE as u32, 1, *viewer, *up, *light).unwrap();
-        let supply = Only(&exhibits[*exhibit].model);
+        let supply = SingleMaterial(&items[*item].model);
         let rendering = render(&scene, &supply, Options::default(), &|_, _| {}).unwrap();
         let expected = Bitmap::display(&rendering);
         let (mut compared, mut lit, mut most) = (0, 0, 0);
@@ -141,11 +141,11 @@ fn the_page_shades_its_sphere_as_the_renderer_does_and_follows_the_mouse() {
             lit += usize::from(found[1] > 8);
         }
         println!(
-            "exhibit {exhibit}: {compared} pixels, {lit} of them lit, at most {most} steps apart"
+            "exhibit {item}: {compared} pixels, {lit} of them lit, at most {most} steps apart"
         );
         // Of a dark material with the light from behind, a tenth.
         assert!(compared > 2000 && lit > 200, "{compared} {lit}");
         // Single precision moves a value across the edge of a step, but no further.
-        assert!(most <= 1, "exhibit {exhibit}: {most} steps");
+        assert!(most <= 1, "exhibit {item}: {most} steps");
     }
 }

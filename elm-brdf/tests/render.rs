@@ -10,12 +10,16 @@ mod networks;
 use std::f64::consts::PI;
 use std::path::Path;
 
-use elm_brdf::render::{Bitmap, Options, Rendering, Savings, render};
+use elm_brdf::render::{Bitmap, Optimizations, Options, Rendering, render};
 use elm_brdf::scene_materials::Scene;
 use elm_brdf::scenes::{NAMES, builtin};
 use networks::library;
 
-fn picture(text: &str, savings: Savings, threads: usize) -> Result<Rendering, elm_brdf::Error> {
+fn picture(
+    text: &str,
+    savings: Optimizations,
+    threads: usize,
+) -> Result<Rendering, elm_brdf::Error> {
     let scene = Scene::parse(text, Path::new("tests/scene.toml"))?;
     let options = Options { savings, threads };
     Ok(render(&scene, &library(None), options, &|_, _| {})?)
@@ -97,7 +101,7 @@ fn a_lambert_sphere_under_a_directional_light_is_albedo_over_pi_times_the_cosine
         + "[material.m]\nanalytic = 'lambert'\nalbedo = 0.6\n[[directional]]\n\
            towards = [0, 0, 1]\nirradiance = [2, 2, 2]\n"
         + SPHERE;
-    let picture = picture(&text, Savings::LOSSLESS, 1).unwrap();
+    let picture = picture(&text, Optimizations::LOSSLESS, 1).unwrap();
     // A pixel's mean of the cosine sqrt(1 - r^2), by the midpoint rule on 64 x 64 points.
     for (column, row) in [(4, 4), (2, 4), (6, 1), (0, 0)] {
         let mut expected = 0.0;
@@ -147,7 +151,7 @@ edge_u = [1, 0, 0]
 edge_v = [0, 0, 1]
 radiance = [3, 3, 3]
 ";
-    let found = picture(text, Savings::LOSSLESS, 1).unwrap().pixels[0][0];
+    let found = picture(text, Optimizations::LOSSLESS, 1).unwrap().pixels[0][0];
     let expected = 0.5 * 3.0 * factor;
     assert!((found / expected - 1.0).abs() < 2e-3, "{found} {expected}");
 }
@@ -157,7 +161,7 @@ fn in_a_white_furnace_a_white_surface_disappears() {
     let text = head(24, 24, "samples = 64")
         + "[material.m]\nanalytic = 'lambert'\nalbedo = 1\n[environment]\n"
         + SPHERE;
-    let picture = picture(&text, Savings::LOSSLESS, 2).unwrap();
+    let picture = picture(&text, Optimizations::LOSSLESS, 2).unwrap();
     // With r the ratio of the density of the light's samples, which is the integrand itself, to
     // that of the material's, a sample is r^2 / (1 + r^2) from the one way and r' / (1 + r'^2)
     // from the other: between 0 and 1.5 with mean 1, so its deviation is at most sqrt(1 * 0.5).
@@ -181,7 +185,7 @@ fn several_bounces_between_white_walls_conserve_energy() {
         + "[material.m]\nanalytic = 'lambert'\nalbedo = 1\n[environment]\n\
            [[plane]]\npoint = [0, -1, 0]\nnormal = [0, 1, 0]\nmaterial = 'm'\n"
         + SPHERE;
-    let picture = picture(&text, Savings::LOSSLESS, 2).unwrap();
+    let picture = picture(&text, Optimizations::LOSSLESS, 2).unwrap();
     let mean = picture.pixels.iter().map(|p| p[0]).sum::<f64>() / 64.0;
     // Russian roulette adds noise; 16384 paths of relative deviation below 1 leave 3 / 128.
     assert!((mean - 1.0).abs() < 3.0 / 128.0, "{mean}");
@@ -189,15 +193,15 @@ fn several_bounces_between_white_walls_conserve_energy() {
 
 #[test]
 fn lossless_savings_give_the_same_picture_bit_for_bit_on_any_number_of_threads() {
-    let reference = picture(&everything(), Savings::NONE, 1).unwrap();
+    let reference = picture(&everything(), Optimizations::NONE, 1).unwrap();
     assert!(reference.pixels.iter().flatten().all(|v| v.is_finite()));
     for threads in [1, 3] {
-        let saved = picture(&everything(), Savings::LOSSLESS, threads).unwrap();
+        let saved = picture(&everything(), Optimizations::LOSSLESS, threads).unwrap();
         assert_eq!(saved.pixels, reference.pixels);
         assert!(saved.account.done.evaluations * 2 < reference.account.done.evaluations);
     }
     for name in ["materials", "channels", "directions", "repeated"] {
-        let savings = Savings::LOSSLESS.without(name).unwrap();
+        let savings = Optimizations::LOSSLESS.without(name).unwrap();
         let without = picture(&everything(), savings, 2).unwrap();
         assert_eq!(without.pixels, reference.pixels, "{name}");
     }
@@ -220,13 +224,17 @@ fn all_savings_stay_within_half_a_display_step_on_average_and_two_at_most() {
             };
             sheet.render(&library(None), options, &|_, _| {}).unwrap()
         };
-        let (brute, saved) = (render(Savings::NONE), render(Savings::ALL));
+        let (brute, saved) = (render(Optimizations::NONE), render(Optimizations::ALL));
         let evaluations = |rendering: &Rendering| rendering.account.done.evaluations;
         assert!(evaluations(&saved) < evaluations(&brute), "{name}");
         steps_apart(&Bitmap::display(&brute), &Bitmap::display(&saved), name);
     }
     let render = |savings| Bitmap::display(&picture(&everything(), savings, 0).unwrap());
-    steps_apart(&render(Savings::NONE), &render(Savings::ALL), "everything");
+    steps_apart(
+        &render(Optimizations::NONE),
+        &render(Optimizations::ALL),
+        "everything",
+    );
 }
 
 fn steps_apart(a: &Bitmap, b: &Bitmap, name: &str) {
@@ -255,7 +263,7 @@ fn of_61_materials_only_the_3_that_are_seen_are_made() {
     }
     // Hidden behind the sphere in the middle.
     text += "[[sphere]]\ncentre = [0, 0, -3]\nradius = 0.5\nmaterial = 'm40'\n";
-    let account = picture(&text, Savings::ALL, 2).unwrap().account;
+    let account = picture(&text, Optimizations::ALL, 2).unwrap().account;
     let used: Vec<&str> = account.materials_used.keys().map(String::as_str).collect();
     assert_eq!(
         (account.materials_defined, used),
@@ -269,7 +277,7 @@ fn a_light_inside_a_sphere_lights_nothing_outside() {
         + "[material.m]\nanalytic = 'lambert'\n[[point]]\nposition = [0, 0, 0]\n[[area]]\n\
            corner = [-0.1, -0.1, 0.1]\nedge_u = [0.2, 0, 0]\nedge_v = [0, 0.2, 0]\n"
         + SPHERE;
-    let picture = picture(&text, Savings::ALL, 1).unwrap();
+    let picture = picture(&text, Optimizations::ALL, 1).unwrap();
     assert!(picture.pixels.iter().flatten().all(|&v| v == 0.0));
 }
 
@@ -352,7 +360,9 @@ fn impossible_scenes_are_errors_of_one_line_that_name_the_place() {
         ),
     ];
     for (text, part) in table {
-        let error = picture(&text, Savings::ALL, 1).unwrap_err().to_string();
+        let error = picture(&text, Optimizations::ALL, 1)
+            .unwrap_err()
+            .to_string();
         assert!(error.contains(part), "expected '{part}' in '{error}'");
         assert!(!error.contains('\n'), "{error}");
     }
@@ -360,7 +370,7 @@ fn impossible_scenes_are_errors_of_one_line_that_name_the_place() {
 
 #[test]
 fn an_encoded_picture_is_read_back() {
-    let picture = picture(&(head(4, 4, "") + "[environment]\n"), Savings::ALL, 1).unwrap();
+    let picture = picture(&(head(4, 4, "") + "[environment]\n"), Optimizations::ALL, 1).unwrap();
     for name in ["a.png", "a.exr"] {
         let format = Rendering::format(Path::new(name)).unwrap();
         let read = image::load_from_memory_with_format(&picture.encode(format).unwrap(), format);

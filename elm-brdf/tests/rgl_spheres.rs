@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use elm_brdf::render::{Options, render};
-use elm_brdf::scene_materials::{Library, Scene};
+use elm_brdf::scene_materials::{Scene, SceneMaterialLoader};
 
 /// Luminance of linear sRGB.
 fn luminance(pixel: &[f64; 3]) -> f64 {
@@ -74,7 +74,7 @@ irradiance = [1, 1, 1]
 "
     );
     let scene = Scene::parse(&text, &data.join("scene.toml")).unwrap();
-    let library = Library::new(None);
+    let library = SceneMaterialLoader::new(None);
     render(&scene, &library, Options::default(), &|_, _| {})
         .unwrap()
         .pixels

@@ -11,8 +11,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use elm_brdf::render::{Material, MaterialLoader, Options, Savings, render};
-use elm_brdf::scene_materials::{Library, MaterialTable, Scene};
+use elm_brdf::render::{Material, MaterialLoader, Optimizations, Options, render};
+use elm_brdf::scene_materials::{MaterialTable, Scene, SceneMaterialLoader};
 use elm_datasets::curet::MATERIALS;
 use elm_datasets::geometry::{DirectionPair, cartesian};
 use networks::library;
@@ -21,7 +21,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// Models of every third material of CUReT's files, or of the stand-in, with their numbers.
 fn fitted(curet: Option<&Path>) -> Vec<(usize, Material)> {
-    let library = Library::new(curet.map(PathBuf::from));
+    let library = SceneMaterialLoader::new(curet.map(PathBuf::from));
     (1..=MATERIALS)
         .step_by(3)
         .map(|id| {
@@ -218,7 +218,7 @@ material = 'm'
 ";
     let scene = Scene::parse(text, Path::new("scene.toml")).unwrap();
     let options = Options {
-        savings: Savings::LOSSLESS,
+        savings: Optimizations::LOSSLESS,
         threads: 2,
     };
     let library = library(None);

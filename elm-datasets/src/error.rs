@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use crate::text::none_or_list;
 
 /// Bytes that a file may have, unless its format says how many there are.
-pub(crate) const LARGEST_FILE: u64 = 1 << 30;
+pub(crate) const MAX_FILE_BYTES: u64 = 1 << 30;
 
 /// What a numbered line of a CUReT file describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,7 +63,7 @@ pub enum Error {
     #[error(
         "{}: expected at most {} bytes, found {found}",
         path.display(),
-        LARGEST_FILE
+        MAX_FILE_BYTES
     )]
     TooLarge {
         /// The file.

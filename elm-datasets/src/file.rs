@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{self, BufWriter, Read as _, Write};
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, LARGEST_FILE};
+use crate::error::{Error, MAX_FILE_BYTES};
 
 /// The whole file, unless it is larger than any of these formats gets.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, Error> {
@@ -14,13 +14,13 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>, Error> {
     };
     let file = fs::File::open(path).map_err(failed)?;
     let found = file.metadata().map_err(failed)?.len();
-    if found > LARGEST_FILE {
+    if found > MAX_FILE_BYTES {
         let path = path.to_owned();
         return Err(Error::TooLarge { path, found });
     }
     let mut bytes = Vec::new();
     // A pipe has no length to look at.
-    file.take(LARGEST_FILE)
+    file.take(MAX_FILE_BYTES)
         .read_to_end(&mut bytes)
         .map_err(failed)?;
     Ok(bytes)

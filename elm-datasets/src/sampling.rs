@@ -10,10 +10,10 @@ use crate::geometry::{Angles, DirectionPair, Vector, cartesian, reflect};
 use crate::toy::MAX_ROWS;
 
 /// Cosine of the polar angles' upper limit, 85 degrees, when directions are drawn at random.
-const LEAST_COSINE: f64 = 0.087;
+const MIN_COSINE: f64 = 0.087;
 
 /// Largest angle between the normal and a half vector near it, in radians.
-const LARGEST_TILT: f64 = 0.3;
+const MAX_TILT: f64 = 0.3;
 
 /// A choice of pairs of directions, all of them above the horizon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,18 +103,18 @@ fn random(rows: usize, seed: u64) -> Vec<DirectionPair> {
         .collect()
 }
 
-/// Uniform over the cap where the cosine is at least [`LEAST_COSINE`].
+/// Uniform over the cap where the cosine is at least [`MIN_COSINE`].
 fn above(rng: &mut impl Rng) -> Vector {
-    let cos: f64 = rng.random_range(LEAST_COSINE..=1.0);
+    let cos: f64 = rng.random_range(MIN_COSINE..=1.0);
     cartesian(cos.acos(), rng.random_range(-PI..PI))
 }
 
 fn near_mirror(rng: &mut impl Rng, light: Vector) -> Vector {
     // For half of the azimuths the tilt lifts the viewer, so that few trials are needed.
     loop {
-        let tilt = rng.random_range(0.0..=LARGEST_TILT);
+        let tilt = rng.random_range(0.0..=MAX_TILT);
         let viewer = reflect(light, cartesian(tilt, rng.random_range(-PI..PI)));
-        if viewer[2] >= LEAST_COSINE {
+        if viewer[2] >= MIN_COSINE {
             return viewer;
         }
     }
@@ -164,10 +164,10 @@ mod tests {
                 outgoing: viewer,
             } = *both;
             // Through the arc cosine and back costs a few units in the last place.
-            assert!(light[2] >= LEAST_COSINE - 1e-15 && viewer[2] >= LEAST_COSINE - 1e-15);
+            assert!(light[2] >= MIN_COSINE - 1e-15 && viewer[2] >= MIN_COSINE - 1e-15);
             let tilt = half_vector(light, viewer).unwrap()[2].acos();
-            assert!(row % 2 == 0 || tilt <= LARGEST_TILT + 1e-7, "{tilt}");
-            near += usize::from(tilt <= LARGEST_TILT);
+            assert!(row % 2 == 0 || tilt <= MAX_TILT + 1e-7, "{tilt}");
+            near += usize::from(tilt <= MAX_TILT);
         }
         assert!((2000..3000).contains(&near), "{near}");
     }
@@ -178,7 +178,7 @@ mod tests {
         let pairs = random(8000, 2);
         let even = pairs.iter().step_by(2);
         let mean = even.map(|both| both.outgoing[2]).sum::<f64>() / 4000.0;
-        let expected = f64::midpoint(LEAST_COSINE, 1.0);
+        let expected = f64::midpoint(MIN_COSINE, 1.0);
         assert!((mean - expected).abs() < 4.0 * 0.264 / 4000_f64.sqrt());
     }
 

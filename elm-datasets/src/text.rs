@@ -14,11 +14,11 @@ pub(crate) fn none_or_list<S: AsRef<str>>(names: &[S]) -> String {
 
 /// A piece of a file for an error: no more than a line can hold.
 pub(crate) fn shorten(text: &str) -> String {
-    const LONGEST: usize = 32;
-    if text.chars().count() <= LONGEST {
+    const MAX_CHARS: usize = 32;
+    if text.chars().count() <= MAX_CHARS {
         return text.to_owned();
     }
-    text.chars().take(LONGEST).chain("...".chars()).collect()
+    text.chars().take(MAX_CHARS).chain("...".chars()).collect()
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use elm::solve::{PseudoInverse, Ridge, Solver};
 use elm::{Activation, ElmParams, Scaler};
 use elm_brdf::features::Features;
 use elm_brdf::link::Link;
-use elm_brdf::model::{BrdfParams, ScaledOnce};
+use elm_brdf::model::{BrdfParams, GlobalScaling};
 use elm_brdf::protocol::{Folds, cross_validate};
 use elm_datasets::{Invalid, MaterialId, Measurements, curet, synthetic};
 use ndarray::{Array2, ArrayView2, Axis, concatenate};
@@ -109,7 +109,7 @@ fn where_nothing_is_scaled_scaling_once_is_scaling_in_each_fold() {
             .intercept(false),
     };
     let each = cross_validate(&params, &data, &folds, |_, _| {}).unwrap();
-    let once = ScaledOnce::new(params).unwrap();
+    let once = GlobalScaling::new(params).unwrap();
     let mut calls = Vec::new();
     let once = cross_validate(&once, &data, &folds, |done, all| calls.push((done, all))).unwrap();
     assert_eq!(calls, [(10, 10)]);

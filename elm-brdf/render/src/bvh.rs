@@ -6,12 +6,12 @@ use bvh::bounding_hierarchy::BHShape;
 use bvh::bvh::{Bvh, BvhNode};
 use nalgebra::Point3;
 
-use crate::shape::{Form, Meeting, Ray};
+use crate::shape::{Intersection, Primitive, Ray};
 use crate::vector::Vec3;
 
 /// Forms in a hierarchy of boxes; those without bounds beside it.
 pub(crate) struct Hierarchy {
-    forms: Vec<Form>,
+    primitives: Vec<Primitive>,
     bvh: Bvh<f64, 3>,
     /// The form of each leaf.
     leaves: Vec<usize>,
@@ -47,11 +47,11 @@ impl BHShape<f64, 3> for Leaf {
 const USUAL_DEPTH: usize = 64;
 
 impl Hierarchy {
-    pub(crate) fn new(forms: Vec<Form>) -> Self {
+    pub(crate) fn new(primitives: Vec<Primitive>) -> Self {
         let mut leaves = Vec::new();
         let mut unbounded = Vec::new();
         let mut whole: Option<[Vec3; 2]> = None;
-        for (form, bounds) in forms.iter().map(Form::bounds).enumerate() {
+        for (form, bounds) in primitives.iter().map(Primitive::bounds).enumerate() {
             let Some([low, high]) = bounds else {
                 unbounded.push(form);
                 continue;
@@ -66,7 +66,7 @@ impl Hierarchy {
             });
         }
         Self {
-            forms,
+            primitives,
             bvh: Bvh::build(&mut leaves),
             leaves: leaves.into_iter().map(|leaf| leaf.form).collect(),
             unbounded,
@@ -74,8 +74,8 @@ impl Hierarchy {
         }
     }
 
-    pub(crate) fn form(&self, index: usize) -> &Form {
-        &self.forms[index]
+    pub(crate) fn form(&self, index: usize) -> &Primitive {
+        &self.primitives[index]
     }
 
     /// Diagonal of the box around all bounded forms.
@@ -84,11 +84,11 @@ impl Hierarchy {
     }
 
     /// The nearest form that a ray meets between `near` and `far`, by its index.
-    pub(crate) fn nearest(&self, ray: &Ray, near: f64, far: f64) -> Option<(usize, Meeting)> {
+    pub(crate) fn nearest(&self, ray: &Ray, near: f64, far: f64) -> Option<(usize, Intersection)> {
         let mut best = None;
         let mut far = far;
         self.walk(ray, near, far, |form| {
-            if let Some(meeting) = self.forms[form].meet(ray, near, far) {
+            if let Some(meeting) = self.primitives[form].meet(ray, near, far) {
                 far = meeting.distance;
                 best = Some((form, meeting));
             }
@@ -101,7 +101,7 @@ impl Hierarchy {
     pub(crate) fn blocked(&self, ray: &Ray, near: f64, far: f64) -> bool {
         let mut met = false;
         self.walk(ray, near, far, |form| {
-            met = self.forms[form].meet(ray, near, far).is_some();
+            met = self.primitives[form].meet(ray, near, far).is_some();
             (!met).then_some(far)
         });
         met
@@ -231,27 +231,27 @@ mod tests {
             centres in prop::collection::vec(prop::array::uniform3(-5.0..5.0_f64), 1..60),
             aim in prop::array::uniform3(-2.0..2.0_f64),
         ) {
-            let forms: Vec<Form> = centres
+            let primitives: Vec<Primitive> = centres
                 .iter()
                 .enumerate()
                 .map(|(index, centre)| match index % 3 {
-                    0 => Form::Sphere { centre: (*centre).into(), radius: 0.4 },
-                    1 => Form::Parallelogram {
+                    0 => Primitive::Sphere { centre: (*centre).into(), radius: 0.4 },
+                    1 => Primitive::Parallelogram {
                         corner: (*centre).into(), u: Vec3::x(), v: Vec3::z(),
                     },
-                    _ => Form::Plane { point: Vec3::from(*centre) * 3.0, normal: Vec3::y() },
+                    _ => Primitive::Plane { point: Vec3::from(*centre) * 3.0, normal: Vec3::y() },
                 })
                 .collect();
             let ray = Ray {
                 origin: Vec3::new(0.0, 0.0, 9.0),
                 direction: (Vec3::from(aim) - Vec3::new(0.0, 0.0, 9.0)).normalize(),
             };
-            let brute = forms
+            let brute = primitives
                 .iter()
                 .filter_map(|form| form.meet(&ray, 1e-9, f64::INFINITY))
                 .map(|meeting| meeting.distance)
                 .reduce(f64::min);
-            let hierarchy = Hierarchy::new(forms);
+            let hierarchy = Hierarchy::new(primitives);
             let found = hierarchy.nearest(&ray, 1e-9, f64::INFINITY);
             prop_assert_eq!(found.map(|(_, meeting)| meeting.distance), brute);
             prop_assert_eq!(hierarchy.blocked(&ray, 1e-9, f64::INFINITY), brute.is_some());
@@ -263,7 +263,7 @@ mod tests {
 
     #[test]
     fn many_forms_in_one_place_do_not_overflow_anything() {
-        let sphere = Form::Sphere {
+        let sphere = Primitive::Sphere {
             centre: Vec3::zeros(),
             radius: 1.0,
         };

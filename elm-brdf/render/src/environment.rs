@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::distribution::Distribution2;
 use crate::error::{Error, Result};
-use crate::vector::{Frame, Rgb, Vec3, largest, luminance, scaled, times};
+use crate::vector::{Rgb, ShadingFrame, Vec3, largest, luminance, scaled, times};
 use elm_datasets::geometry::Vector;
 
 /// Most pixels of a picture of the environment.
@@ -16,14 +16,14 @@ const MAX_PIXELS: u64 = 1 << 25;
 pub(crate) struct Environment {
     /// Radiance, or factor on the panorama.
     pub(crate) radiance: Rgb,
-    pub(crate) panorama: Option<Panorama>,
+    pub(crate) panorama: Option<EnvironmentMap>,
     /// Whether rays from the camera see it.
     pub(crate) visible: bool,
 }
 
 /// A picture in latitude and longitude.
 #[derive(Debug, Clone)]
-pub(crate) struct Panorama {
+pub(crate) struct EnvironmentMap {
     width: usize,
     height: usize,
     pixels: Vec<[f32; 3]>,
@@ -40,7 +40,7 @@ pub(crate) struct LightSample {
     pub(crate) distance: f64,
     /// What arrives: radiance over density, or irradiance across the direction for a light
     /// without extent.
-    pub(crate) arriving: Rgb,
+    pub(crate) irradiance: Rgb,
     /// Density in solid angle; `None` for a light without extent, which no other way of sampling
     /// can find.
     pub(crate) density: Option<f64>,
@@ -68,14 +68,17 @@ impl Environment {
             Some(panorama) => panorama.sample(u),
             None => {
                 let local = cosine_weighted(u);
-                (Frame::about(normal).world(local), local[2] / PI)
+                (
+                    ShadingFrame::from_normal(normal).world(local),
+                    local[2] / PI,
+                )
             }
         };
         let radiance = self.radiance(direction);
         (density > 0.0 && largest(radiance) > 0.0).then(|| LightSample {
             direction,
             distance: f64::INFINITY,
-            arriving: scaled(radiance, 1.0 / density),
+            irradiance: scaled(radiance, 1.0 / density),
             density: Some(density),
         })
     }
@@ -88,7 +91,7 @@ pub(crate) fn cosine_weighted([a, b]: [f64; 2]) -> Vector {
     [radius * cos, radius * sin, (1.0 - a).max(0.0).sqrt()]
 }
 
-impl Panorama {
+impl EnvironmentMap {
     /// Reads OpenEXR or Radiance HDR (or any picture that the decoder knows).
     pub(crate) fn read(path: &Path, rotation: f64) -> Result<Self> {
         let wrong = |reason: String| Error::Picture {
@@ -255,7 +258,7 @@ mod tests {
                     // Unless a rounding error moves the direction to the next cell.
                     let ratio = density / sample.density.unwrap();
                     assert!((ratio - 1.0).abs() < 1e-6 || sample.direction.y.abs() < 1.0);
-                    sum += sample.arriving[0] * value(sample.direction) / (n * n) as f64;
+                    sum += sample.irradiance[0] * value(sample.direction) / (n * n) as f64;
                 }
             }
         }
@@ -277,7 +280,7 @@ mod tests {
     fn a_white_panorama_covers_the_sphere_and_lights_like_the_sky() {
         let sky = Environment {
             radiance: [1.0; 3],
-            panorama: Some(Panorama::new(64, vec![[1.0; 3]; 64 * 32], 30.0)),
+            panorama: Some(EnvironmentMap::new(64, vec![[1.0; 3]; 64 * 32], 30.0)),
             visible: true,
         };
         // Within a row the integrand runs from sin theta at one end to that at the other, over that
@@ -291,7 +294,7 @@ mod tests {
     fn the_middle_column_lies_towards_minus_z_and_its_right_towards_plus_x() {
         let mut pixels = vec![[0.0_f32; 3]; 8 * 4];
         pixels[8 + 4] = [1.0, 0.0, 0.0];
-        let panorama = Panorama::new(8, pixels, 0.0);
+        let panorama = EnvironmentMap::new(8, pixels, 0.0);
         // The pixel's centre is half a column right of the middle, half a row above the horizon.
         let (phi, theta) = (TAU / 16.0, 1.5 / 4.0 * PI);
         let direction = Vec3::new(

@@ -18,14 +18,14 @@ struct Pixel {
     squares: [f32; 3],
     products: [[f32; 2]; 3],
     /// Sums of the places about the middle, x and y, and of their squares and product.
-    places: [f32; 2],
+    sample_positions: [f32; 2],
     place_squares: [f32; 3],
     samples: u32,
-    signature: u64,
+    visibility_hash: u64,
     /// Whether its samples have different signatures.
-    mixed: bool,
+    has_edge: bool,
     /// Whether chance chose more than the places of its samples.
-    drawn: bool,
+    is_stochastic: bool,
 }
 
 /// Standard errors that a pixel may still be off by when it stops.
@@ -41,9 +41,9 @@ impl Film {
 
     pub(crate) fn add(&mut self, sample: &Sample) {
         let pixel = &mut self.pixels[sample.pixel as usize];
-        pixel.mixed |= pixel.samples > 0 && pixel.signature != sample.signature;
-        pixel.signature = sample.signature;
-        pixel.drawn |= sample.drawn;
+        pixel.has_edge |= pixel.samples > 0 && pixel.visibility_hash != sample.visibility_hash;
+        pixel.visibility_hash = sample.visibility_hash;
+        pixel.is_stochastic |= sample.is_stochastic;
         pixel.samples += 1;
         add(&mut pixel.sum, sample.radiance);
         let [x, y] = sample.place.map(|place| place - 0.5);
@@ -52,8 +52,8 @@ impl Film {
             pixel.products[channel][0] += (x * value) as f32;
             pixel.products[channel][1] += (y * value) as f32;
         }
-        pixel.places[0] += x as f32;
-        pixel.places[1] += y as f32;
+        pixel.sample_positions[0] += x as f32;
+        pixel.sample_positions[1] += y as f32;
         pixel.place_squares[0] += (x * x) as f32;
         pixel.place_squares[1] += (x * y) as f32;
         pixel.place_squares[2] += (y * y) as f32;
@@ -79,12 +79,12 @@ impl Film {
                     .map(move |c| r * self.width + c)
             });
             own.samples < total
-                && (own.drawn
+                && (own.is_stochastic
                     || near.any(|near| {
                         let pixel = &self.pixels[near];
                         // The neighbours' errors stand in for what few samples have not yet seen.
-                        pixel.mixed
-                            || pixel.signature != own.signature
+                        pixel.has_edge
+                            || pixel.visibility_hash != own.visibility_hash
                             || f64::from(errors[near]) > steps
                     }))
         };
@@ -121,14 +121,14 @@ impl Pixel {
         if self.samples < 4 {
             return f64::INFINITY;
         }
-        let places = Places::new(n, self.places, self.place_squares);
+        let sample_positions = SamplePositions::new(n, self.sample_positions, self.place_squares);
         let strata = 2.0_f64.powi(total.trailing_zeros() as i32);
         (0..3)
             .map(|channel| {
                 let mean = self.sum[channel] / n;
                 let products = self.products[channel].map(f64::from);
                 let spread = (f64::from(self.squares[channel]) - n * mean * mean).max(0.0);
-                let plane = places.fit(mean, products);
+                let plane = sample_positions.fit(mean, products);
                 let rest = (spread - plane.spread).max(0.0) / (n - 3.0);
                 // A place within a stratum has a variance of 1/12 of its width squared.
                 let [u, v] = plane.slopes;
@@ -143,7 +143,7 @@ impl Pixel {
 }
 
 /// Where the samples of a pixel lie, about its middle.
-struct Places {
+struct SamplePositions {
     n: f64,
     mean: [f64; 2],
     /// Sums of squares and of the product about the mean, and their determinant.
@@ -152,7 +152,7 @@ struct Places {
 }
 
 /// The plane through samples that errs least.
-struct Plane {
+struct LinearFit {
     slopes: [f64; 2],
     /// By how much it is off at the samples' mean place from the pixel's middle.
     offset: f64,
@@ -160,7 +160,7 @@ struct Plane {
     spread: f64,
 }
 
-impl Places {
+impl SamplePositions {
     fn new(n: f64, sums: [f32; 2], squares: [f32; 3]) -> Self {
         let mean @ [x, y] = sums.map(|sum| f64::from(sum) / n);
         let [xx, xy, yy] = squares.map(f64::from);
@@ -175,11 +175,11 @@ impl Places {
     }
 
     /// Fits a plane to values, given their mean and the sums of their products with the places.
-    fn fit(&self, mean: f64, products: [f64; 2]) -> Plane {
+    fn fit(&self, mean: f64, products: [f64; 2]) -> LinearFit {
         let [xx, xy, yy] = self.squares;
         // Places on a line leave the plane open; then all is rest.
         if self.determinant < 1e-4 * xx * yy {
-            return Plane {
+            return LinearFit {
                 slopes: [0.0; 2],
                 offset: 0.0,
                 spread: 0.0,
@@ -195,7 +195,7 @@ impl Places {
             (py * xx - px * xy) / self.determinant,
         ];
         let [u, v] = slopes;
-        Plane {
+        LinearFit {
             slopes,
             offset: u * x + v * y,
             spread: u * px + v * py,
@@ -231,13 +231,13 @@ mod tests {
                     [0.645, 0.125],
                     [0.895, 0.625],
                 ][n as usize];
-                let (value, signature) = values(pixel, n, place);
+                let (value, visibility_hash) = values(pixel, n, place);
                 film.add(&Sample {
                     pixel,
                     place,
                     radiance: [value; 3],
-                    signature,
-                    drawn: false,
+                    visibility_hash,
+                    is_stochastic: false,
                 });
             }
         }

@@ -6,8 +6,8 @@
 //! so that a network sees long batches. Light is sampled both from the lights and from the
 //! material, and both are combined by multiple importance sampling.
 //!
-//! [`Savings`] says what may be left out, and [`Account`] what was. With
-//! [`Savings::LOSSLESS`] the picture is the same, bit for bit, as with [`Savings::NONE`]; the
+//! [`Optimizations`] says what may be left out, and [`RenderStats`] what was. With
+//! [`Optimizations::LOSSLESS`] the picture is the same, bit for bit, as with [`Optimizations::NONE`]; the
 //! rest stays within bounds that are smaller than a display step. Threads never change a picture:
 //! random numbers belong to pixels, sums have a fixed order.
 //!
@@ -16,10 +16,10 @@
 
 #![forbid(unsafe_code)]
 
-mod account;
-mod batch;
+mod adaptive;
 mod bvh;
 mod camera;
+mod compiled_scene;
 mod distribution;
 mod environment;
 mod error;
@@ -27,32 +27,32 @@ mod film;
 mod light;
 mod loader;
 mod material;
+mod material_cache;
 mod mesh;
 mod picture;
-mod proxy;
 mod random;
 pub mod scene;
+mod shading_queue;
 mod shape;
 mod sheet;
-mod shelf;
-mod together;
+mod stats;
+mod tabulated_sampler;
 mod tracer;
 mod vector;
-mod world;
 
-pub use account::{Account, Savings, Seconds, Work};
 pub use error::{Error, MeshProblem, Place, Result};
 pub use loader::{LoadError, LoadedMaterial, MaterialLoader};
 pub use material::Material;
 pub use picture::Bitmap;
 pub use scene::Scene;
 pub use sheet::{Content, Panel, Sheet};
+pub use stats::{EvalCost, Optimizations, RenderStats, Seconds};
 
 /// How to render, beside what the scene says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
     /// Work that may be left out.
-    pub savings: Savings,
+    pub savings: Optimizations,
     /// Worker threads; 0 for as many as the machine has.
     pub threads: usize,
 }
@@ -60,7 +60,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            savings: Savings::ALL,
+            savings: Optimizations::ALL,
             threads: 0,
         }
     }
@@ -86,7 +86,7 @@ pub struct Rendering {
     /// Where they come from, each source once.
     pub origins: Vec<String>,
     /// What was done.
-    pub account: Account,
+    pub account: RenderStats,
 }
 
 /// Renders a scene with materials from `loader`. `progress` is told now and then how many of the
@@ -101,7 +101,7 @@ pub fn render<M: Sync>(
     options: Options,
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<Rendering> {
-    let mut rendered = together::render(&[scene], &[], loader, options, progress)?;
+    let mut rendered = adaptive::render(&[scene], &[], loader, options, progress)?;
     // One for each scene.
     rendered.pop().ok_or(Error::Sheet { panel: 0 })
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::environment::{Environment, LightSample};
-use crate::shape::Form;
+use crate::shape::Primitive;
 use crate::vector::{BLACK, Rgb, Vec3, scaled};
 
 /// A light.
@@ -39,7 +39,7 @@ impl Light {
             } => Some(LightSample {
                 direction: *towards,
                 distance: f64::INFINITY,
-                arriving: *irradiance,
+                irradiance: *irradiance,
                 density: None,
             }),
             Self::Point {
@@ -52,7 +52,7 @@ impl Light {
                 (distance > 0.0).then(|| LightSample {
                     direction: to_light / distance,
                     distance,
-                    arriving: scaled(*intensity, 1.0 / squared),
+                    irradiance: scaled(*intensity, 1.0 / squared),
                     density: None,
                 })
             }
@@ -90,8 +90,8 @@ impl Light {
 }
 
 impl Area {
-    pub(crate) fn form(&self) -> Form {
-        Form::Parallelogram {
+    pub(crate) fn form(&self) -> Primitive {
+        Primitive::Parallelogram {
             corner: self.corner,
             u: self.edges[0],
             v: self.edges[1],
@@ -121,7 +121,7 @@ impl Area {
         (radiance != BLACK && density.is_finite() && density > 0.0).then(|| LightSample {
             direction,
             distance,
-            arriving: scaled(radiance, 1.0 / density),
+            irradiance: scaled(radiance, 1.0 / density),
             density: Some(density),
         })
     }
@@ -170,7 +170,7 @@ mod tests {
             for j in 0..n {
                 let u = [(i as f64 + 0.5) / n as f64, (j as f64 + 0.5) / n as f64];
                 let sample = square().sample(Vec3::zeros(), Vec3::z(), u).unwrap();
-                sum += sample.arriving[0] * sample.direction.z / (n * n) as f64;
+                sum += sample.irradiance[0] * sample.direction.z / (n * n) as f64;
             }
         }
         // The midpoint rule's error is of the order of 1/n^2.

@@ -3,12 +3,12 @@
 use ndarray::ArrayViewMut2;
 
 use crate::error::{Error, Result};
-use crate::proxy::{Proxy, Survey};
+use crate::tabulated_sampler::{SampleGrid, TabulatedSampler};
 use crate::vector::{Rgb, largest, luminance, scaled, times};
 use elm_datasets::Brdf;
 use elm_datasets::geometry::{DirectionPair, Vector};
 
-/// A model may pass the largest value of its [`Survey`] by this factor; beyond, it is cut off.
+/// A model may pass the largest value of its [`SampleGrid`] by this factor; beyond, it is cut off.
 const CEILING_MARGIN: f64 = 2.0;
 
 /// A reflectance model ready for rendering.
@@ -34,8 +34,8 @@ pub struct Material {
     brdf: Box<dyn Brdf>,
     /// Factor on each channel.
     factor: Rgb,
-    ceiling: f64,
-    proxy: Proxy,
+    max_value: f64,
+    sampler: TabulatedSampler,
     albedo: f64,
     /// Factor that keeps the albedo from passing 1; 1 where that was not asked for or needed.
     scale: f64,
@@ -56,28 +56,28 @@ impl Material {
         if !tint.iter().all(|c| (0.0..=1e6).contains(c)) {
             return Err(Error::Tint { found: tint });
         }
-        let survey = Survey::new();
+        let grid = SampleGrid::new();
         let raw = |pairs: &[DirectionPair]| -> Result<Vec<Rgb>> {
             let mut room = Vec::new();
             evaluate(&*brdf, pairs, &mut room)?;
             let rows = room.chunks_exact(channels);
             Ok(rows.map(|row| colour(row, f64::INFINITY)).collect())
         };
-        let cells = raw(&survey.cells)?;
+        let cells = raw(&grid.cells)?;
         let highest = cells
             .iter()
-            .chain(&raw(&survey.peaks)?)
+            .chain(&raw(&grid.peaks)?)
             .map(|&value| largest(value))
             .fold(0.0, f64::max);
         let grey: Vec<f64> = cells
             .iter()
             .map(|&value| luminance(times(value, tint)))
             .collect();
-        let proxy = Proxy::new(&grey);
+        let sampler = TabulatedSampler::new(&grey);
         let largest_albedo = (0..3)
             .map(|channel| {
                 let values: Vec<f64> = cells.iter().map(|v| v[channel] * tint[channel]).collect();
-                let albedo = Proxy::new(&values);
+                let albedo = TabulatedSampler::new(&values);
                 albedo
                     .albedo()
                     .map(|(_, albedo)| albedo)
@@ -92,8 +92,8 @@ impl Material {
         Ok(Self {
             brdf,
             factor: scaled(tint, scale),
-            ceiling: CEILING_MARGIN * highest,
-            proxy,
+            max_value: CEILING_MARGIN * highest,
+            sampler,
             albedo: largest_albedo,
             scale,
         })
@@ -120,7 +120,7 @@ impl Material {
         evaluate(&*self.brdf, pairs, room)?;
         values.clear();
         let rows = room.chunks_exact(self.channels());
-        values.extend(rows.map(|row| times(colour(row, self.ceiling), self.factor)));
+        values.extend(rows.map(|row| times(colour(row, self.max_value), self.factor)));
         Ok(())
     }
 
@@ -129,13 +129,13 @@ impl Material {
     /// the cosine alone.
     #[must_use]
     pub fn sample(&self, outgoing: Vector, u: [f64; 2]) -> (Vector, f64) {
-        self.proxy.sample(outgoing, u)
+        self.sampler.sample(outgoing, u)
     }
 
     /// The density in solid angle of [`sample`](Self::sample).
     #[must_use]
     pub fn pdf(&self, outgoing: Vector, incident: Vector) -> f64 {
-        self.proxy.density(outgoing, incident)
+        self.sampler.density(outgoing, incident)
     }
 
     /// Directional albedo, as luminance: the part of light from `theta_o` (radians) that is
@@ -143,7 +143,7 @@ impl Material {
     #[must_use]
     pub fn albedo(&self) -> Vec<(f64, f64)> {
         let scaled = |(theta_o, albedo)| (theta_o, self.scale * albedo);
-        self.proxy.albedo().map(scaled).collect()
+        self.sampler.albedo().map(scaled).collect()
     }
 
     /// The largest directional albedo of any channel before any rescaling; above 1 the model
@@ -161,8 +161,8 @@ impl Material {
 
     /// No value of [`eval`](Self::eval) is larger, channel by channel.
     #[must_use]
-    pub fn ceiling(&self) -> Rgb {
-        scaled(self.factor, self.ceiling)
+    pub fn max_value(&self) -> Rgb {
+        scaled(self.factor, self.max_value)
     }
 
     /// Number of channels that are evaluated.
@@ -176,7 +176,7 @@ impl std::fmt::Debug for Material {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Material")
             .field("channels", &self.channels())
-            .field("ceiling", &self.ceiling)
+            .field("ceiling", &self.max_value)
             .field("albedo", &self.albedo)
             .finish_non_exhaustive()
     }
@@ -193,10 +193,10 @@ fn evaluate(brdf: &dyn Brdf, pairs: &[DirectionPair], room: &mut Vec<f64>) -> Re
     Ok(())
 }
 
-/// One or three values as a colour between 0 and `ceiling`.
-fn colour(values: &[f64], ceiling: f64) -> Rgb {
+/// One or three values as a colour between 0 and `max_value`.
+fn colour(values: &[f64], max_value: f64) -> Rgb {
     // In this order also no number becomes 0, and infinity the ceiling.
-    let safe = |value: f64| value.max(0.0).min(ceiling);
+    let safe = |value: f64| value.max(0.0).min(max_value);
     let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
     match *values {
         [r, g, b] => [r, g, b].map(|value| finite(safe(value))),

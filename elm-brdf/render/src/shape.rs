@@ -18,7 +18,7 @@ impl Ray {
 
 /// A surface of simple form.
 #[derive(Debug, Clone)]
-pub(crate) enum Form {
+pub(crate) enum Primitive {
     Sphere { centre: Vec3, radius: f64 },
     Plane { point: Vec3, normal: Vec3 },
     Parallelogram { corner: Vec3, u: Vec3, v: Vec3 },
@@ -36,7 +36,7 @@ pub(crate) struct Triangle {
 
 /// Where a ray met a form.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Meeting {
+pub(crate) struct Intersection {
     pub(crate) distance: f64,
     /// Position along the edges, for parallelograms and triangles.
     uv: [f64; 2],
@@ -54,9 +54,9 @@ pub(crate) struct SurfacePoint {
     pub(crate) lifted: Vec3,
 }
 
-impl Form {
+impl Primitive {
     /// The nearest meeting farther than `near` and nearer than `far`.
-    pub(crate) fn meet(&self, ray: &Ray, near: f64, far: f64) -> Option<Meeting> {
+    pub(crate) fn meet(&self, ray: &Ray, near: f64, far: f64) -> Option<Intersection> {
         let within = |distance: f64| distance > near && distance < far;
         match self {
             Self::Sphere { centre, radius } => {
@@ -72,14 +72,14 @@ impl Form {
                 let half = half_squared.sqrt();
                 let (first, second) = (along - half, along + half);
                 let distance = if first > near { first } else { second };
-                within(distance).then_some(Meeting {
+                within(distance).then_some(Intersection {
                     distance,
                     uv: [0.0; 2],
                 })
             }
             Self::Plane { point, normal } => {
                 let distance = (point - ray.origin).dot(normal) / ray.direction.dot(normal);
-                within(distance).then_some(Meeting {
+                within(distance).then_some(Intersection {
                     distance,
                     uv: [0.0; 2],
                 })
@@ -95,7 +95,7 @@ impl Form {
     }
 
     /// The surface where a ray met it.
-    pub(crate) fn surface(&self, ray: &Ray, meeting: Meeting) -> SurfacePoint {
+    pub(crate) fn surface(&self, ray: &Ray, meeting: Intersection) -> SurfacePoint {
         let flat = |position, normal| SurfacePoint {
             position,
             geometric: normal,
@@ -173,7 +173,7 @@ impl Triangle {
 
 /// Where a ray crosses the plane of two edges, if on their side of both (Moeller and Trumbore,
 /// *Fast, Minimum Storage Ray/Triangle Intersection*, 1997).
-fn meet_edges(ray: &Ray, corner: &Vec3, u: &Vec3, v: &Vec3) -> Option<Meeting> {
+fn meet_edges(ray: &Ray, corner: &Vec3, u: &Vec3, v: &Vec3) -> Option<Intersection> {
     let p = ray.direction.cross(v);
     let determinant = u.dot(&p);
     let inverse = 1.0 / determinant;
@@ -182,7 +182,7 @@ fn meet_edges(ray: &Ray, corner: &Vec3, u: &Vec3, v: &Vec3) -> Option<Meeting> {
     let q = from_corner.cross(u);
     let t = ray.direction.dot(&q) * inverse;
     // Also false where the ray lies in the plane, and both are infinite or no number.
-    (determinant != 0.0 && s >= 0.0 && t >= 0.0).then(|| Meeting {
+    (determinant != 0.0 && s >= 0.0 && t >= 0.0).then(|| Intersection {
         distance: v.dot(&q) * inverse,
         uv: [s, t],
     })
@@ -199,13 +199,13 @@ mod tests {
         }
     }
 
-    fn distance(form: &Form, ray: &Ray) -> Option<f64> {
+    fn distance(form: &Primitive, ray: &Ray) -> Option<f64> {
         form.meet(ray, 1e-9, f64::INFINITY).map(|m| m.distance)
     }
 
     #[test]
     fn a_ray_meets_a_sphere_from_outside_from_inside_and_not_behind() {
-        let sphere = Form::Sphere {
+        let sphere = Primitive::Sphere {
             centre: Vec3::zeros(),
             radius: 2.0,
         };
@@ -230,12 +230,12 @@ mod tests {
     #[test]
     fn a_parallelogram_ends_at_its_edges_and_a_triangle_at_its_diagonal() {
         let [u, v] = [Vec3::x() * 2.0, Vec3::y()];
-        let square = Form::Parallelogram {
+        let square = Primitive::Parallelogram {
             corner: Vec3::zeros(),
             u,
             v,
         };
-        let triangle = Form::Triangle(Box::new(Triangle {
+        let triangle = Primitive::Triangle(Box::new(Triangle {
             corner: Vec3::zeros(),
             edges: [u, v],
             normals: [Vec3::z(); 3],

@@ -1,10 +1,10 @@
 //! Several pictures as one.
 
-use crate::account::Account;
+use crate::adaptive::{self, Difference};
 use crate::error::{Error, Result};
 use crate::loader::MaterialLoader;
 use crate::scene::Scene;
-use crate::together::{self, Difference};
+use crate::stats::RenderStats;
 use crate::{Options, Rendering};
 
 /// Pictures of one size in rows and columns, rendered as one picture.
@@ -108,7 +108,7 @@ impl<M> Sheet<M> {
             let here = scenes.len() as u64;
             let (places, scenes): (Vec<usize>, Vec<&Scene<M>>) = scenes.into_iter().unzip();
             let renderings =
-                together::render(&scenes, &differences, loader, options, &|part, whole| {
+                adaptive::render(&scenes, &differences, loader, options, &|part, whole| {
                     // Panels of one size take about as long as each other.
                     let each = whole / here;
                     progress(before * each + part, count * each);
@@ -180,7 +180,7 @@ impl<M> Sheet<M> {
         let rows = panels.len().div_ceil(columns);
         let mut pixels = vec![[0.0; 3]; columns * width * rows * height];
         let mut labels = Vec::new();
-        let mut account = Account::default();
+        let mut account = RenderStats::default();
         let mut origins: Vec<String> = Vec::new();
         for (index, (panel, rendering)) in self.panels.iter().zip(panels).enumerate() {
             if (rendering.width, rendering.height) != (first.width, first.height) {
@@ -255,7 +255,7 @@ fn difference(a: &Rendering, b: &Rendering, factor: f64) -> Rendering {
         caption: String::new(),
         names: Vec::new(),
         origins: Vec::new(),
-        account: Account::default(),
+        account: RenderStats::default(),
         ..*a
     }
 }

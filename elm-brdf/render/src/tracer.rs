@@ -1,32 +1,32 @@
 //! Paths from the camera through the scene, many at a time: every path waits at its surface until
 //! all evaluations there are done together.
 
-use crate::account::{Reason, Savings, Tally};
-use crate::batch::{Batch, CAPACITY, Request, SCATTERED};
+use crate::compiled_scene::{CompiledScene, Hit};
 use crate::environment::LightSample;
 use crate::error::Result;
 use crate::light::{Light, power_heuristic};
+use crate::material_cache::MaterialCache;
 use crate::random::{Purpose, numbers, pixel_seed};
+use crate::shading_queue::{CAPACITY, EvalRequest, SCATTERED, ShadingQueue};
 use crate::shape::{Ray, SurfacePoint};
-use crate::shelf::Shelf;
-use crate::vector::{BLACK, Frame, Rgb, Vec3, add, largest, scaled, times};
-use crate::world::{Hit, World};
+use crate::stats::{Optimizations, Reason, TileStats};
+use crate::vector::{BLACK, Rgb, ShadingFrame, Vec3, add, largest, scaled, times};
 use elm_datasets::geometry::{DirectionPair, Vector};
 
 /// Surfaces after which dim paths may end by chance.
 const ROULETTE_FROM: u32 = 3;
 /// The least cosine between the viewer and a smooth normal, where interpolation tips the normal
 /// away from the viewer.
-const LEAST_COSINE: f64 = 1e-3;
+const MIN_COSINE: f64 = 1e-3;
 
 /// Signatures up to here are of rays that met no surface.
 const MISSED: u64 = 1;
 
 /// Everything that the paths of a picture share.
 pub(crate) struct Tracer<'a> {
-    pub(crate) world: &'a World,
-    pub(crate) shelf: &'a Shelf<'a>,
-    pub(crate) savings: Savings,
+    pub(crate) world: &'a CompiledScene,
+    pub(crate) cache: &'a MaterialCache<'a>,
+    pub(crate) savings: Optimizations,
     /// Pixels across.
     pub(crate) width: u32,
     /// Surfaces that light may meet.
@@ -49,9 +49,9 @@ pub(crate) struct Sample {
     pub(crate) radiance: Rgb,
     /// The shape that was met and the lights without extent that reach it, as a hash; equal where
     /// no edge lies between.
-    pub(crate) signature: u64,
+    pub(crate) visibility_hash: u64,
     /// Whether chance chose more than the place in the pixel: a point on a light, or a direction.
-    pub(crate) drawn: bool,
+    pub(crate) is_stochastic: bool,
 }
 
 /// A path on its way.
@@ -64,7 +64,7 @@ struct Path {
     hit: Hit,
     throughput: Rgb,
     radiance: Rgb,
-    signature: u64,
+    visibility_hash: u64,
     /// What leaving out dim lights may still cost.
     tolerance: f64,
     state: State,
@@ -86,7 +86,7 @@ enum State {
 struct Vertex {
     point: SurfacePoint,
     /// About the shading normal, on the viewer's side.
-    frame: Frame,
+    frame: ShadingFrame,
     geometric: Vec3,
     outgoing: Vector,
     material: usize,
@@ -99,10 +99,10 @@ impl Vertex {
         let geometric = towards(point.geometric, to_viewer);
         let mut shading = towards(point.shading, geometric);
         let cosine = shading.dot(&to_viewer);
-        if cosine < LEAST_COSINE {
-            shading = (shading + to_viewer * (LEAST_COSINE - cosine)).normalize();
+        if cosine < MIN_COSINE {
+            shading = (shading + to_viewer * (MIN_COSINE - cosine)).normalize();
         }
-        let frame = Frame::about(shading);
+        let frame = ShadingFrame::from_normal(shading);
         Self {
             point,
             outgoing: frame.local(&to_viewer),
@@ -145,8 +145,8 @@ impl Tracer<'_> {
     pub(crate) fn samples(
         &self,
         pixels: &[(u32, std::ops::Range<u32>)],
-        batch: &mut Batch,
-        tally: &mut Tally,
+        batch: &mut ShadingQueue,
+        tally: &mut TileStats,
         mut sink: impl FnMut(Sample),
     ) -> Result<()> {
         // As many paths at a time as keep the batch full without a large memory.
@@ -173,12 +173,12 @@ impl Tracer<'_> {
                         self.shade(index, &mut paths, surface, batch, tally)?;
                     }
                 }
-                self.settle(&mut paths, batch, tally)?;
+                self.flush(&mut paths, batch, tally)?;
                 if !alive {
                     break;
                 }
                 for path in &mut paths {
-                    path.advance(surface);
+                    path.next_bounce(surface);
                 }
             }
             for path in &paths {
@@ -186,8 +186,8 @@ impl Tracer<'_> {
                     pixel: path.pixel,
                     place: path.place,
                     radiance: path.radiance,
-                    signature: path.signature,
-                    drawn: self.draws() && path.signature > MISSED,
+                    visibility_hash: path.visibility_hash,
+                    is_stochastic: self.draws() && path.visibility_hash > MISSED,
                 });
             }
         }
@@ -212,7 +212,7 @@ impl Tracer<'_> {
             .camera
             .ray(f64::from(column) + x, f64::from(row) + y);
         let hit = self.world.intersect(&ray);
-        let (radiance, state, signature) = match hit {
+        let (radiance, state, visibility_hash) = match hit {
             Hit::Reflector { object, .. } => {
                 (BLACK, State::Arrived, u64::from(object) + MISSED + 1)
             }
@@ -232,7 +232,7 @@ impl Tracer<'_> {
             hit,
             throughput: [1.0; 3],
             radiance,
-            signature,
+            visibility_hash,
             tolerance: self.tolerance,
             state,
         }
@@ -244,8 +244,8 @@ impl Tracer<'_> {
         index: usize,
         paths: &mut [Path],
         surface: u32,
-        batch: &mut Batch,
-        tally: &mut Tally,
+        batch: &mut ShadingQueue,
+        tally: &mut TileStats,
     ) -> Result<()> {
         let path = &mut paths[index];
         path.state = State::Ended;
@@ -260,17 +260,17 @@ impl Tracer<'_> {
         for light in 0..self.world.lights.len() {
             let path = &mut paths[index];
             let request = self.next_event(light, &vertex, path, surface, scatters, tally)?;
-            batch.requests.extend(request.map(|request| Request {
+            batch.requests.extend(request.map(|request| EvalRequest {
                 path: index,
                 ..request
             }));
             if batch.requests.len() >= CAPACITY {
-                self.settle(paths, batch, tally)?;
+                self.flush(paths, batch, tally)?;
             }
         }
         if scatters {
             let request = self.scatter(&vertex, &mut paths[index], surface, tally)?;
-            batch.requests.extend(request.map(|request| Request {
+            batch.requests.extend(request.map(|request| EvalRequest {
                 path: index,
                 ..request
             }));
@@ -286,8 +286,8 @@ impl Tracer<'_> {
         path: &mut Path,
         surface: u32,
         scatters: bool,
-        tally: &mut Tally,
-    ) -> Result<Option<Request>> {
+        tally: &mut TileStats,
+    ) -> Result<Option<EvalRequest>> {
         let source = &self.world.lights[light];
         if self.savings.dim_lights && self.is_dim(source, vertex, path)? {
             tally.skip(Reason::DimLight, vertex.material, 1);
@@ -305,7 +305,7 @@ impl Tracer<'_> {
         let LightSample {
             direction,
             distance,
-            arriving,
+            irradiance,
             density,
         } = sample;
         let cosine = normal.dot(&direction);
@@ -325,15 +325,15 @@ impl Tracer<'_> {
             return Ok(None);
         }
         let pair = vertex.pair(direction);
-        let material = self.shelf.get(vertex.material)?;
+        let material = self.cache.get(vertex.material)?;
         let share = match density {
             Some(density) if scatters => {
                 power_heuristic(density, material.pdf(pair.outgoing, pair.incident))
             }
             _ => 1.0,
         };
-        let weight = scaled(times(path.throughput, arriving), cosine * share);
-        Ok(Some(Request {
+        let weight = scaled(times(path.throughput, irradiance), cosine * share);
+        Ok(Some(EvalRequest {
             material: vertex.material,
             pair,
             path: 0,
@@ -349,8 +349,8 @@ impl Tracer<'_> {
         if irradiance[0].is_infinite() {
             return Ok(false);
         }
-        let ceiling = self.shelf.get(vertex.material)?.ceiling();
-        let most = largest(times(path.throughput, times(irradiance, ceiling)));
+        let max_value = self.cache.get(vertex.material)?.max_value();
+        let most = largest(times(path.throughput, times(irradiance, max_value)));
         // Nothing at all is left to the horizon test, which costs no tolerance.
         let dim = most > 0.0 && most <= path.tolerance;
         if dim {
@@ -366,10 +366,10 @@ impl Tracer<'_> {
         vertex: &Vertex,
         path: &mut Path,
         surface: u32,
-        tally: &mut Tally,
-    ) -> Result<Option<Request>> {
+        tally: &mut TileStats,
+    ) -> Result<Option<EvalRequest>> {
         let [a, b, ..] = numbers(path.seed, path.sample, Purpose::Scatter(surface));
-        let material = self.shelf.get(vertex.material)?;
+        let material = self.cache.get(vertex.material)?;
         let (incident, density) = material.sample(vertex.outgoing, [a, b]);
         let direction = vertex.frame.world(incident);
         let mut reason = None;
@@ -392,7 +392,7 @@ impl Tracer<'_> {
         } else {
             0.0
         };
-        Ok(Some(Request {
+        Ok(Some(EvalRequest {
             material: vertex.material,
             pair: DirectionPair {
                 incident,
@@ -443,11 +443,16 @@ impl Tracer<'_> {
     }
 
     /// Carries out all requests and gives their values to the paths.
-    fn settle(&self, paths: &mut [Path], batch: &mut Batch, tally: &mut Tally) -> Result<()> {
-        batch.evaluate(self.shelf, self.savings, tally)?;
+    fn flush(
+        &self,
+        paths: &mut [Path],
+        batch: &mut ShadingQueue,
+        tally: &mut TileStats,
+    ) -> Result<()> {
+        batch.evaluate(self.cache, self.savings, tally)?;
         for (request, &value) in batch.requests.iter().zip(&batch.values) {
             if request.counts {
-                paths[request.path].receive(request, value);
+                paths[request.path].accumulate(request, value);
             }
         }
         batch.clear();
@@ -459,10 +464,10 @@ impl Path {
     /// Notes that a light without extent reaches the first surface.
     fn mark(&mut self, light: usize) {
         let bit = (light as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        self.signature ^= bit | 1 << 63;
+        self.visibility_hash ^= bit | 1 << 63;
     }
 
-    fn receive(&mut self, request: &Request, value: Rgb) {
+    fn accumulate(&mut self, request: &EvalRequest, value: Rgb) {
         let weighted = times(request.weight, value);
         if request.light == SCATTERED {
             self.throughput = times(self.throughput, weighted);
@@ -476,7 +481,7 @@ impl Path {
     }
 
     /// Moves on to the next surface, if there is one and the path is worth it.
-    fn advance(&mut self, surface: u32) {
+    fn next_bounce(&mut self, surface: u32) {
         let State::Leaving(ray, hit) = self.state else {
             return;
         };

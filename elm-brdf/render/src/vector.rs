@@ -40,17 +40,17 @@ pub(crate) fn luminance(a: Rgb) -> f64 {
 
 /// An orthonormal frame with its third axis along a surface normal.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Frame {
+pub(crate) struct ShadingFrame {
     tangent: Vec3,
     bitangent: Vec3,
     /// The third axis.
     pub(crate) normal: Vec3,
 }
 
-impl Frame {
+impl ShadingFrame {
     /// A frame about the unit vector `n`, without a branch that makes a seam (Duff et al.,
     /// *Building an Orthonormal Basis, Revisited*, JCGT 6(1), 2017).
-    pub(crate) fn about(n: Vec3) -> Self {
+    pub(crate) fn from_normal(n: Vec3) -> Self {
         let sign = 1.0_f64.copysign(n.z);
         let a = -1.0 / (sign + n.z);
         let b = n.x * n.y * a;
@@ -87,7 +87,7 @@ mod tests {
             theta in 0.0..std::f64::consts::PI, phi in -3.2..3.2_f64,
         ) {
             let n = Vec3::from(elm_datasets::geometry::cartesian(theta, phi));
-            let frame = Frame::about(n);
+            let frame = ShadingFrame::from_normal(n);
             prop_assert!((frame.tangent.cross(&frame.bitangent) - n).norm() < 1e-14);
             let w = Vec3::new(0.3, -0.5, 0.8).normalize();
             prop_assert!((frame.world(frame.local(&w)) - w).norm() < 1e-14);

@@ -240,15 +240,15 @@ fn with_column(matrix: &Array2<f64>, column: &Array1<f64>) -> Array2<f64> {
 }
 
 /// The most rows that a dense kernel matrix is made for: 4000 rows take 128 MB and a minute.
-pub(super) const MOST_ROWS: usize = 4000;
+pub(super) const MAX_ROWS: usize = 4000;
 
-/// Refuses more rows than [`MOST_ROWS`].
+/// Refuses more rows than [`MAX_ROWS`].
 pub(super) fn check_rows(method: &'static str, rows: usize) -> Result<()> {
-    if rows > MOST_ROWS {
+    if rows > MAX_ROWS {
         return Err(Error::TooManyRows {
             method,
             rows,
-            most: MOST_ROWS,
+            most: MAX_ROWS,
         });
     }
     Ok(())

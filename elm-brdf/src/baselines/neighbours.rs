@@ -31,7 +31,7 @@ pub struct Neighbours {
 const POWERS: std::ops::RangeInclusive<i32> = 1..=8;
 
 /// With more rows than this, leave-one-out is measured on so many of them, evenly spread.
-const MOST_TRIALS: usize = 1000;
+const MAX_TRIALS: usize = 1000;
 
 /// Measurements kept by [`Neighbours`].
 pub struct NeighboursModel {
@@ -85,7 +85,7 @@ impl Fit for Neighbours {
 
 /// The power of the smallest leave-one-out error, for each column of targets.
 fn best_powers(nodes: &Array2<f64>, targets: &Array2<f64>, count: usize) -> Vec<i32> {
-    let step = nodes.nrows().div_ceil(MOST_TRIALS);
+    let step = nodes.nrows().div_ceil(MAX_TRIALS);
     let mut best = vec![(f64::INFINITY, *POWERS.start()); targets.ncols()];
     let mut errors = Array2::<f64>::zeros((POWERS.count(), targets.ncols()));
     for row in (0..nodes.nrows()).step_by(step) {

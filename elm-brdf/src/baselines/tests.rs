@@ -382,7 +382,7 @@ fn settings_out_of_range_and_too_many_rows_are_refused() {
     };
     assert!(none.fit(&pairs, values.view()).is_err());
 
-    let many = vec![pairs[0]; kernel::MOST_ROWS + 1];
+    let many = vec![pairs[0]; kernel::MAX_ROWS + 1];
     let values = Array2::from_elem((many.len(), 1), 0.1);
     let error = GaussianProcess::new(features, link).fit(&many, values.view());
     assert!(matches!(error.err(), Some(Error::TooManyRows { .. })));

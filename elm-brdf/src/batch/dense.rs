@@ -123,7 +123,7 @@ impl Bend for SquaredRectified {
     }
 }
 
-/// A hidden layer with its output weights, for up to [`MOST_INPUTS`] inputs and three outputs.
+/// A hidden layer with its output weights, for up to [`MAX_INPUTS`] inputs and three outputs.
 #[derive(Debug, Clone)]
 pub(crate) struct Fused<A> {
     inputs: usize,
@@ -134,7 +134,7 @@ pub(crate) struct Fused<A> {
 }
 
 /// The most inputs of a [`Fused`].
-pub(crate) const MOST_INPUTS: usize = 6;
+pub(crate) const MAX_INPUTS: usize = 6;
 
 impl<A: Real> Fused<A> {
     /// `hidden` gives the bias and the weights of each neuron, `beta` its output weights.
@@ -185,7 +185,7 @@ impl<A: Real> Fused<A> {
             3 => self.go::<S, F, G, 3, 7>(simd, x, out),
             4 => self.go::<S, F, G, 4, 8>(simd, x, out),
             5 => self.go::<S, F, G, 5, 9>(simd, x, out),
-            _ => self.go::<S, F, G, MOST_INPUTS, 10>(simd, x, out),
+            _ => self.go::<S, F, G, MAX_INPUTS, 10>(simd, x, out),
         }
     }
 

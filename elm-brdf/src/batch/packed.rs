@@ -7,7 +7,7 @@ use ndarray::Array2;
 use ndarray::ArrayViewMut2;
 use pulp::Simd;
 
-use super::dense::{Dense, Fused, MOST_INPUTS, Rectified, SquaredRectified};
+use super::dense::{Dense, Fused, MAX_INPUTS, Rectified, SquaredRectified};
 use super::real::Real;
 use super::{Batched, Block, Columns, Kernel, ROWS, eval_pairs, inputs, run};
 use crate::error::{Error, Result};
@@ -119,9 +119,9 @@ impl<A: Real> Packed<A> {
             (0..outputs).step_by(3).map(triple).collect()
         };
         let all = |function: Activation<A>| functions.iter().all(|(_, other)| *other == function);
-        let layers = if inputs <= MOST_INPUTS && all(Activation::Relu) {
+        let layers = if inputs <= MAX_INPUTS && all(Activation::Relu) {
             Layers::Rectified(fused())
-        } else if inputs <= MOST_INPUTS && all(Activation::SquaredRelu) {
+        } else if inputs <= MAX_INPUTS && all(Activation::SquaredRelu) {
             Layers::SquaredRectified(fused())
         } else {
             Layers::Any {

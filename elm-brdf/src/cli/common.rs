@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::data::{self, Source};
 use super::{Failure, say};
 use crate::error::Error;
-use crate::scene_materials::Library;
+use crate::scene_materials::SceneMaterialLoader;
 
 /// Reads one of `names`, and lists them in the help and in the error.
 pub(super) fn one_of<T>(
@@ -29,12 +29,12 @@ pub(super) fn usage(error: impl Display) -> Failure {
 }
 
 /// Where a scene's materials come from.
-pub(super) fn library(named: Option<&Path>) -> Result<Library, Failure> {
+pub(super) fn library(named: Option<&Path>) -> Result<SceneMaterialLoader, Failure> {
     let curet = match Source::find(named)? {
         Source::Curet(dir) => Some(dir),
         Source::Synthetic => None,
     };
-    Ok(Library::new(curet))
+    Ok(SceneMaterialLoader::new(curet))
 }
 
 /// Tells whoever sits at a terminal how to get measurements in place of the stand-in.

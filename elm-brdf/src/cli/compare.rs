@@ -14,8 +14,8 @@ use super::{Failure, models, overwrite, print};
 use crate::fit::AnyFit;
 use crate::protocol::{Folds, MaterialScores, cross_validate, cross_validate_samples};
 use crate::registry::{self, ModelEntry};
-use crate::report::plot::{self, Shown};
-use crate::report::{Comparison, Data, Entry, Format, Words};
+use crate::report::plot::{self, PredictionPlot};
+use crate::report::{Comparison, Data, Entry, Format, ModelLabel};
 use elm_datasets::geometry::DirectionPair;
 
 /// Cross-validate every model on the same folds: analytic models, the database's own basis,
@@ -222,7 +222,7 @@ impl Subject {
             Self::Materials(_, data) => (&data.channels, data.origin == Origin::Curet),
             Self::Samples(material) => (&material.samples.channels, material.id.is_some()),
         };
-        let words = Words {
+        let words = ModelLabel {
             model: model.name.clone(),
             features: model.features.map(|features| features.name().to_owned()),
             target: model.link.map(|link| link.name().to_owned()),
@@ -248,13 +248,13 @@ impl Subject {
         })
     }
 
-    fn shown<'a>(&'a self, scores: &'a [MaterialScores]) -> Vec<Shown<'a>> {
+    fn shown<'a>(&'a self, scores: &'a [MaterialScores]) -> Vec<PredictionPlot<'a>> {
         match self {
-            Self::Materials(_, data) => Shown::of(data, scores),
+            Self::Materials(_, data) => PredictionPlot::of(data, scores),
             Self::Samples(material) => scores
                 .iter()
                 .map(|scores| {
-                    Shown::new(
+                    PredictionPlot::new(
                         material.name.clone(),
                         &material.samples.directions,
                         material.samples.values.view(),

@@ -10,7 +10,7 @@ use super::data::Source;
 use super::{Failure, overwrite, print};
 use crate::error::Error;
 use crate::export::ExportError;
-use crate::gallery::{self, Exhibit};
+use crate::gallery::{self, GalleryItem};
 use crate::model::BrdfModel;
 use crate::protocol::{Folds, cross_validate};
 use crate::recipes;
@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let folds = Folds::new(data.directions.len(), FOLDS.0, FOLDS.1)?;
     let scores = cross_validate(&*network, &data, &folds, |_, _| {})?;
     let origin = format!("ELM fitted to {}", source.caption());
-    let mut exhibits = Vec::with_capacity(materials.len());
+    let mut items = Vec::with_capacity(materials.len());
     for (index, (score, material)) in scores.iter().zip(&data.materials).enumerate() {
         let Some(samples) = data.samples(index) else {
             continue;
@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let brdf = network.fit(&samples.directions, samples.values.view())?;
         let model = BrdfModel::of(&*brdf).ok_or(Error::Export(ExportError::NoNetwork))?;
         let squares = score.channels.iter().map(|c| c.held_out.rmse.powi(2));
-        exhibits.push(Exhibit {
+        items.push(GalleryItem {
             name: format!("{} {}", material.id, material.name),
             origin: origin.clone(),
             model: model.clone(),
@@ -67,9 +67,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         });
     }
     let progress = progress("material");
-    progress.set_length(exhibits.len() as u64);
+    progress.set_length(items.len() as u64);
     let count = |done| progress.set_position(done as u64);
-    gallery::write(&arguments.out, &exhibits, gallery::PICTURE_SIZE, count)?;
+    gallery::write(&arguments.out, &items, gallery::PICTURE_SIZE, count)?;
     progress.finish_and_clear();
     print(&format!("{}\n", arguments.out.join("index.html").display()))
 }

@@ -13,7 +13,7 @@ use crate::baselines::Nbrdf;
 use crate::error::Error;
 use crate::file;
 use crate::metrics::Metric;
-use crate::pareto::{self, Given, Point, Problem};
+use crate::pareto::{self, CostPoint, PretrainedModel, TrainTestSplit};
 use crate::protocol::Folds;
 use crate::registry::{self, Candidate};
 use crate::report::plot;
@@ -69,8 +69,8 @@ struct Subject {
     name: String,
     /// Where the measurements come from, and how they are held out.
     about: String,
-    problems: Vec<Problem>,
-    given: Vec<Given>,
+    problems: Vec<TrainTestSplit>,
+    given: Vec<PretrainedModel>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -207,7 +207,7 @@ fn of_samples(arguments: &Arguments, name: &str, test: Option<&str>) -> Result<S
                     model: material.samples.channels.join(", "),
                     samples: judges.samples.channels.join(", "),
                 })?;
-            let problem = Problem {
+            let problem = TrainTestSplit {
                 train: all.clone(),
                 train_values: values.to_owned(),
                 test: judges.directions,
@@ -217,7 +217,7 @@ fn of_samples(arguments: &Arguments, name: &str, test: Option<&str>) -> Result<S
         }
         None => {
             let folds = Folds::new(all.len(), 5, arguments.seed).map_err(usage)?;
-            let problem = Problem::split(&all, values, |row| folds.of_row(row) == 0);
+            let problem = TrainTestSplit::split(&all, values, |row| folds.of_row(row) == 0);
             (problem, "judged on a fifth of its rows".to_owned())
         }
     };
@@ -236,7 +236,7 @@ fn of_samples(arguments: &Arguments, name: &str, test: Option<&str>) -> Result<S
                 problem.train_values.ncols()
             )));
         }
-        given.push(Given {
+        given.push(PretrainedModel {
             name: NBRDF.to_owned(),
             model: Box::new(model),
             seconds: start.elapsed().as_secs_f64(),
@@ -271,7 +271,7 @@ fn of_materials(arguments: &Arguments) -> Result<Subject, Failure> {
         let pairs = &samples.directions;
         let folds = Folds::new(pairs.len(), arguments.folds, arguments.seed).map_err(usage)?;
         problems.extend((0..arguments.folds).map(|fold| {
-            Problem::split(pairs, samples.values.view(), |row| {
+            TrainTestSplit::split(pairs, samples.values.view(), |row| {
                 folds.of_row(row) == fold
             })
         }));
@@ -289,7 +289,7 @@ fn of_materials(arguments: &Arguments) -> Result<Subject, Failure> {
     })
 }
 
-fn write(dir: &Path, title: &str, metric: Metric, points: &[Point]) -> Result<(), Failure> {
+fn write(dir: &Path, title: &str, metric: Metric, points: &[CostPoint]) -> Result<(), Failure> {
     file::folder(dir)?;
     let failed = |path: &Path, reason: std::io::Error| Error::Write {
         path: path.to_owned(),
@@ -315,7 +315,7 @@ fn write(dir: &Path, title: &str, metric: Metric, points: &[Point]) -> Result<()
     Ok(())
 }
 
-fn describe(title: &str, dir: &Path, points: &[Point]) -> String {
+fn describe(title: &str, dir: &Path, points: &[CostPoint]) -> String {
     let mut text = format!("{title}\n{} models; on the front:\n", points.len());
     let longest = points.iter().map(|point| point.model.len()).max();
     let width = longest.unwrap_or(0).max(5);
@@ -348,7 +348,7 @@ fn describe(title: &str, dir: &Path, points: &[Point]) -> String {
     text
 }
 
-fn line(point: &Point, width: usize) -> String {
+fn line(point: &CostPoint, width: usize) -> String {
     format!(
         "{:width$}  {:>10.3e}  {:>14.2}  {:>8.4}  {:>7}\n",
         point.model, point.error, point.nanoseconds_per_evaluation, point.fit_seconds, point.floats

@@ -12,7 +12,7 @@ use super::{Failure, overwrite, print, say};
 use crate::error::Error;
 use crate::file;
 use crate::render::scene::Image;
-use crate::render::{Account, Options, Rendering, Savings};
+use crate::render::{Optimizations, Options, RenderStats, Rendering};
 use crate::scene_materials::{Scene, Sheet};
 use crate::scenes::builtin;
 
@@ -60,7 +60,7 @@ pub(super) struct Arguments {
     no_skip: bool,
     /// Savings not to make, with commas between.
     #[arg(long, value_name = "LIST", value_delimiter = ',',
-          value_parser = PossibleValuesParser::new(Savings::NAMES))]
+          value_parser = PossibleValuesParser::new(Optimizations::NAMES))]
     without: Vec<String>,
 }
 
@@ -131,18 +131,19 @@ impl Arguments {
         image.seed = self.seed.unwrap_or(image.seed);
     }
 
-    fn savings(&self) -> Savings {
+    fn savings(&self) -> Optimizations {
         if self.no_skip {
-            return Savings::NONE;
+            return Optimizations::NONE;
         }
         // clap lets no other name through.
-        let without = |savings: Savings, name: &String| savings.without(name).unwrap_or(savings);
-        self.without.iter().fold(Savings::ALL, without)
+        let without =
+            |savings: Optimizations, name: &String| savings.without(name).unwrap_or(savings);
+        self.without.iter().fold(Optimizations::ALL, without)
     }
 }
 
 /// Prints the account and writes it as JSON.
-fn account(path: &Path, account: &Account) -> Result<(), Failure> {
+fn account(path: &Path, account: &RenderStats) -> Result<(), Failure> {
     print(&account.to_string())?;
     let mut json = serde_json::to_string_pretty(account).map_err(|error| Error::Write {
         path: path.to_owned(),

@@ -12,10 +12,10 @@ use super::common::{hint, one_of, progress, usage};
 use super::data::Source;
 use super::{Failure, models, overwrite, print};
 use crate::fit::{AnyFit, boxed};
-use crate::model::{BrdfParams, ScaledOnce};
+use crate::model::{BrdfParams, GlobalScaling};
 use crate::protocol::{Folds, MaterialScores, cross_validate};
 use crate::registry;
-use crate::report::plot::{self, Shown};
+use crate::report::plot::{self, PredictionPlot};
 use crate::report::{Format, Protocol, Report, Seconds};
 
 /// Recompute the paper's Tables I to III by cross-validation, beside what the paper printed.
@@ -208,7 +208,7 @@ impl Model {
             Self::Paper(params, once) => {
                 let params = (**params).clone().seed(seed);
                 Some(if *once {
-                    boxed(ScaledOnce::new(params)?)
+                    boxed(GlobalScaling::new(params)?)
                 } else {
                     boxed(params)
                 })
@@ -303,7 +303,7 @@ fn draw(
         protocol.describe(),
         protocol.seed,
     );
-    plot::write(dir, &title, &Shown::of(data, scores))?;
+    plot::write(dir, &title, &PredictionPlot::of(data, scores))?;
     if let Some(method) = method {
         let title = format!("{title}, fitted to all measurements");
         plot::write_fitted_lobes(dir, &title, data, method)?;

@@ -231,23 +231,23 @@ fn survey() -> Vec<DirectionPair> {
         0.549_700_477_901_970_2,
     ];
     /// Just above the horizon, in radians.
-    const MOST: f64 = 1.55;
+    const MAX: f64 = 1.55;
     /// How far from the mirror direction or the light, in radians.
     const NEAR: f64 = 0.1;
     let at = |number: u32| {
         let u = STEPS.map(|step| (0.5 + step * f64::from(number)).fract());
-        let theta_i = MOST * u[0];
+        let theta_i = MAX * u[0];
         let near = theta_i + NEAR * (2.0 * u[1] - 1.0);
         let turned = NEAR * (2.0 * u[2] - 1.0);
         let (theta_o, phi_o) = match number % 8 {
             0 => (near, std::f64::consts::PI + turned),
             1 => (near, turned),
-            _ => (MOST * u[1], std::f64::consts::TAU * u[2]),
+            _ => (MAX * u[1], std::f64::consts::TAU * u[2]),
         };
         DirectionPair::from(Angles {
             theta_i,
             phi_i: 0.0,
-            theta_o: theta_o.clamp(0.0, MOST),
+            theta_o: theta_o.clamp(0.0, MAX),
             phi_o,
         })
     };

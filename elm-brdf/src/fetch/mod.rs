@@ -39,7 +39,7 @@ const KNOWN: [(&str, &str); 2] = [
 ];
 
 /// Forty times the largest of the files.
-const MOST_BYTES: u64 = 4 << 20;
+const MAX_BYTES: u64 = 4 << 20;
 
 /// Why files could not be fetched. Each is one line.
 #[derive(Debug, thiserror::Error)]
@@ -68,7 +68,7 @@ pub enum Error {
         reason: Box<dyn std::error::Error + Send + Sync>,
     },
     /// More bytes than a file of the database can have.
-    #[error("{url}: expected at most {MOST_BYTES} bytes, found more")]
+    #[error("{url}: expected at most {MAX_BYTES} bytes, found more")]
     TooLarge {
         /// The address.
         url: String,
@@ -267,7 +267,7 @@ fn get(agent: &Agent, url: &str, mut progress: impl FnMut(u64)) -> Result<Body, 
     })?;
     let last = response.get_uri().to_string();
     // One byte more than is allowed tells that there are too many.
-    let mut stream = response.into_body().into_reader().take(MOST_BYTES + 1);
+    let mut stream = response.into_body().into_reader().take(MAX_BYTES + 1);
     let mut bytes = Vec::new();
     let mut block = [0; 1 << 13];
     loop {
@@ -279,7 +279,7 @@ fn get(agent: &Agent, url: &str, mut progress: impl FnMut(u64)) -> Result<Body, 
         }
         progress(bytes.len() as u64);
     }
-    if bytes.len() as u64 > MOST_BYTES {
+    if bytes.len() as u64 > MAX_BYTES {
         let url = url.to_owned();
         return Err(Error::TooLarge { url });
     }

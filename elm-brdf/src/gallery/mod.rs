@@ -22,7 +22,7 @@ use crate::render::{
 
 /// A material to show.
 #[derive(Debug, Clone)]
-pub struct Exhibit {
+pub struct GalleryItem {
     /// What it is called.
     pub name: String,
     /// Where its measurements come from.
@@ -102,12 +102,12 @@ pub fn sphere(
 pub struct Shown {}
 
 /// The one model of [`sphere`].
-pub struct Only<'a>(
+pub struct SingleMaterial<'a>(
     /// The model.
     pub &'a BrdfModel,
 );
 
-impl MaterialLoader<Shown> for Only<'_> {
+impl MaterialLoader<Shown> for SingleMaterial<'_> {
     fn load(&self, _: &Shown, _: &Path) -> Result<LoadedMaterial, LoadError> {
         let packed = Packed::<f64>::new(self.0)?;
         Ok(LoadedMaterial::new(Box::new(packed), ""))
@@ -123,37 +123,37 @@ impl MaterialLoader<Shown> for Only<'_> {
 /// whatever rendering reports.
 pub fn write(
     dir: &Path,
-    exhibits: &[Exhibit],
+    items: &[GalleryItem],
     size: u32,
     mut done: impl FnMut(usize),
 ) -> Result<()> {
     file::folder(dir)?;
-    let mut cards = Vec::with_capacity(exhibits.len());
-    for (index, exhibit) in exhibits.iter().enumerate() {
+    let mut cards = Vec::with_capacity(items.len());
+    for (index, item) in items.iter().enumerate() {
         let picture = format!("sphere-{:02}.png", index + 1);
         let scene = sphere(size, 16, [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], LIGHT)?;
         let rendering = render(
             &scene,
-            &Only(&exhibit.model),
+            &SingleMaterial(&item.model),
             Options::default(),
             &|_, _| {},
         )?;
         let path = dir.join(&picture);
         file::replace(&path, &rendering.encode(Rendering::format(&path)?)?)?;
-        cards.push(card(exhibit, picture)?);
+        cards.push(card(item, picture)?);
         done(index + 1);
     }
-    let page = page(&cards, exhibits)?;
+    let page = page(&cards, items)?;
     file::replace(&dir.join("index.html"), page.as_bytes())
 }
 
-fn card(exhibit: &Exhibit, picture: String) -> Result<Card> {
-    let Exhibit {
+fn card(item: &GalleryItem, picture: String) -> Result<Card> {
+    let GalleryItem {
         name,
         origin,
         model,
         held_out,
-    } = exhibit;
+    } = item;
     let material = Material::new(Box::new(model.clone()), [1.0; 3], false)?;
     let glsl = source(model, Language::Glsl, "shown")?;
     let groups = model.network().hidden().groups().iter();
@@ -186,13 +186,13 @@ fn card(exhibit: &Exhibit, picture: String) -> Result<Card> {
         picture,
         lobes: lobes::draw(model)?,
         glsl,
-        ceiling: material.ceiling()[0],
+        ceiling: material.max_value()[0],
     })
 }
 
-fn page(cards: &[Card], exhibits: &[Exhibit]) -> Result<String> {
+fn page(cards: &[Card], items: &[GalleryItem]) -> Result<String> {
     let length = LIGHT.iter().map(|c| c * c).sum::<f64>().sqrt();
-    let mut origins: Vec<&str> = exhibits.iter().map(|e| e.origin.as_str()).collect();
+    let mut origins: Vec<&str> = items.iter().map(|e| e.origin.as_str()).collect();
     origins.sort_unstable();
     origins.dedup();
     let settings = Settings {

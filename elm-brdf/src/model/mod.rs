@@ -11,8 +11,8 @@
 
 mod channels;
 mod file;
+mod global_scaling;
 mod layer;
-mod scaled_once;
 mod tuned;
 
 use elm_datasets::brdf::EvalError;
@@ -32,8 +32,8 @@ use crate::metrics::{Metric, Metrics};
 use elm_datasets::Brdf;
 use elm_datasets::brdf::check_directions;
 use elm_datasets::geometry::DirectionPair;
+pub use global_scaling::GlobalScaling;
 pub use layer::{Draw, Layer};
-pub use scaled_once::ScaledOnce;
 pub use tuned::{Lean, SideBySide, Tuned};
 
 /// What a [`BrdfModel`] is made of.

@@ -384,7 +384,7 @@ fn provenance(
     pairs: &[DirectionPair],
     values: ArrayView2<'_, f64>,
 ) -> Provenance {
-    let exchanged = quality::exchanged(pairs);
+    let exchanged = quality::reciprocal_pairs(pairs);
     let floors: Vec<f64> = values
         .columns()
         .into_iter()

@@ -8,7 +8,7 @@
 //!
 //! A model is on the **front** where no other is both as exact and as fast, and better in one.
 
-mod clock;
+mod timing;
 
 use std::time::Instant;
 
@@ -25,7 +25,7 @@ use elm_datasets::geometry::DirectionPair;
 
 /// Measurements to fit to, and others of the same material that judge.
 #[derive(Debug, Clone)]
-pub struct Problem {
+pub struct TrainTestSplit {
     /// Directions that are fitted to.
     pub train: Vec<DirectionPair>,
     /// BRDF in 1/sr at those, shape (pairs, channels).
@@ -36,7 +36,7 @@ pub struct Problem {
     pub test_values: Array2<f64>,
 }
 
-impl Problem {
+impl TrainTestSplit {
     /// Holds out the rows that `is_held_out` says.
     #[must_use]
     pub fn split(
@@ -58,7 +58,7 @@ impl Problem {
 
 /// What one model costs and what it is worth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Point {
+pub struct CostPoint {
     /// The model's name.
     pub model: String,
     /// Its held-out error: mean over problems.
@@ -74,7 +74,7 @@ pub struct Point {
 }
 
 /// A model that was not fitted here, with the seconds that it took to read.
-pub struct Given {
+pub struct PretrainedModel {
     /// Its name.
     pub name: String,
     /// The model.
@@ -90,11 +90,11 @@ pub struct Given {
 /// Those of the methods and models.
 pub fn run(
     candidates: &[Candidate],
-    given: Vec<Given>,
-    problems: &[Problem],
+    given: Vec<PretrainedModel>,
+    problems: &[TrainTestSplit],
     metric: Metric,
     mut done: impl FnMut(usize),
-) -> Result<Vec<Point>> {
+) -> Result<Vec<CostPoint>> {
     let mut points = Vec::new();
     let mut models: Vec<Box<dyn Model>> = Vec::new();
     for (index, candidate) in candidates.iter().enumerate() {
@@ -107,8 +107,11 @@ pub fn run(
                 .method
                 .fit(&problem.train, problem.train_values.view())?;
             seconds.push(start.elapsed().as_secs_f64());
-            for (place, (name, form)) in forms(&candidate.name, model)?.into_iter().enumerate() {
-                let error = judge(form.as_ref(), problem, metric)?;
+            for (place, (name, form)) in packed_variants(&candidate.name, model)?
+                .into_iter()
+                .enumerate()
+            {
+                let error = held_out_error(form.as_ref(), problem, metric)?;
                 match errors.get_mut(place) {
                     Some((_, errors)) => errors.push(error),
                     None => errors.push((name, vec![error])),
@@ -118,8 +121,8 @@ pub fn run(
                 }
             }
         }
-        let fit_seconds = clock::median(seconds);
-        points.extend(errors.into_iter().map(|(model, errors)| Point {
+        let fit_seconds = timing::median(seconds);
+        points.extend(errors.into_iter().map(|(model, errors)| CostPoint {
             model,
             error: errors.iter().sum::<f64>() / errors.len() as f64,
             fit_seconds,
@@ -129,7 +132,7 @@ pub fn run(
         }));
         done(index + 1);
     }
-    for Given {
+    for PretrainedModel {
         name,
         model,
         seconds,
@@ -137,9 +140,9 @@ pub fn run(
     {
         let errors: Vec<f64> = problems
             .iter()
-            .map(|problem| judge(model.as_ref(), problem, metric))
+            .map(|problem| held_out_error(model.as_ref(), problem, metric))
             .collect::<Result<_>>()?;
-        points.push(Point {
+        points.push(CostPoint {
             model: name,
             error: errors.iter().sum::<f64>() / errors.len() as f64,
             fit_seconds: seconds,
@@ -150,7 +153,7 @@ pub fn run(
         models.push(model);
     }
     if let Some(problem) = problems.first() {
-        let times = clock::take_turns(&models, &problem.test)?;
+        let times = timing::take_turns(&models, &problem.test)?;
         for ((point, model), time) in points.iter_mut().zip(&models).zip(times) {
             point.nanoseconds_per_evaluation = time;
             point.floats = model.stored_floats();
@@ -161,7 +164,7 @@ pub fn run(
 }
 
 /// A network in single and in double precision, packed; any other model as it is.
-fn forms(name: &str, model: Box<dyn Model>) -> Result<Vec<(String, Box<dyn Model>)>> {
+fn packed_variants(name: &str, model: Box<dyn Model>) -> Result<Vec<(String, Box<dyn Model>)>> {
     let Some(network) = BrdfModel::of(&*model) else {
         return Ok(vec![(name.to_owned(), model)]);
     };
@@ -177,15 +180,15 @@ fn forms(name: &str, model: Box<dyn Model>) -> Result<Vec<(String, Box<dyn Model
     ])
 }
 
-fn judge(model: &dyn Model, problem: &Problem, metric: Metric) -> Result<f64> {
+fn held_out_error(model: &dyn Model, problem: &TrainTestSplit, metric: Metric) -> Result<f64> {
     let predicted = model.eval(&problem.test)?;
     let metrics = Metrics::of(&problem.test, predicted.view(), problem.test_values.view())?;
     Ok(metric.of(&metrics))
 }
 
 /// Sorts points by time and says which are on the front.
-fn mark_front(points: &mut [Point]) {
-    let time = |point: &Point| point.nanoseconds_per_evaluation;
+fn mark_front(points: &mut [CostPoint]) {
+    let time = |point: &CostPoint| point.nanoseconds_per_evaluation;
     points.sort_by(|a, b| {
         time(a)
             .total_cmp(&time(b))
@@ -201,12 +204,15 @@ fn mark_front(points: &mut [Point]) {
 /// The fastest model, other than `reference`, whose error is no larger than that one's, and its
 /// share of that one's time.
 #[must_use]
-pub fn cheapest_as_exact<'a>(points: &'a [Point], reference: &str) -> Option<(&'a Point, f64)> {
+pub fn cheapest_as_exact<'a>(
+    points: &'a [CostPoint],
+    reference: &str,
+) -> Option<(&'a CostPoint, f64)> {
     let reference = points.iter().find(|point| point.model == reference)?;
     let as_exact = points
         .iter()
         .filter(|point| point.error <= reference.error && point.model != reference.model);
-    let time = |point: &Point| point.nanoseconds_per_evaluation;
+    let time = |point: &CostPoint| point.nanoseconds_per_evaluation;
     let fastest = as_exact.min_by(|a, b| time(a).total_cmp(&time(b)))?;
     Some((fastest, time(fastest) / time(reference)))
 }
@@ -215,8 +221,8 @@ pub fn cheapest_as_exact<'a>(points: &'a [Point], reference: &str) -> Option<(&'
 mod tests {
     use super::*;
 
-    fn point(model: &str, error: f64, nanoseconds: f64) -> Point {
-        Point {
+    fn point(model: &str, error: f64, nanoseconds: f64) -> CostPoint {
+        CostPoint {
             model: model.to_owned(),
             error,
             fit_seconds: 0.0,
@@ -258,7 +264,7 @@ mod tests {
             })
             .collect();
         let values = Array2::from_shape_fn((10, 1), |(row, _)| row as f64);
-        let problem = Problem::split(&pairs, values.view(), |row| row % 5 == 2);
+        let problem = TrainTestSplit::split(&pairs, values.view(), |row| row % 5 == 2);
         assert_eq!(problem.test_values.column(0).to_vec(), [2.0, 7.0]);
         assert_eq!(problem.test[1].incident[0], 7.0);
         assert_eq!(problem.train.len(), 8);

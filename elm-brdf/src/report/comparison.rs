@@ -61,12 +61,12 @@ pub struct Entry {
     /// Wall-clock time of fitting and evaluating all folds, in seconds.
     pub seconds: f64,
     /// Each material and channel by itself.
-    pub materials: Vec<OfMaterial>,
+    pub materials: Vec<MaterialScore>,
 }
 
 /// The error of one model on one channel of one material.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct OfMaterial {
+pub struct MaterialScore {
     /// CUReT's number; `None` for samples of one's own.
     pub id: Option<usize>,
     /// The material's name.
@@ -79,7 +79,7 @@ pub struct OfMaterial {
 
 /// What a table says of a model besides its scores.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Words {
+pub struct ModelLabel {
     /// As in [`Entry`].
     pub model: String,
     /// As in [`Entry`].
@@ -95,7 +95,7 @@ impl Entry {
     /// materials are CUReT's, whose figures the paper prints.
     #[must_use]
     pub fn new(
-        words: Words,
+        words: ModelLabel,
         channels: &[String],
         measured: bool,
         runs: &[Vec<MaterialScores>],
@@ -109,14 +109,14 @@ impl Entry {
         let of_material = |m: usize, c: usize, channel: &String| {
             let material = first.get(m)?;
             let of_seeds = runs.iter().filter_map(|run| run.get(m)?.channels.get(c));
-            Some(OfMaterial {
+            Some(MaterialScore {
                 id: material.id.map(elm_datasets::MaterialId::number),
                 name: material.name.clone(),
                 channel: channel.clone(),
                 rmse: mean(of_seeds.map(|scores| scores.held_out.rmse))?,
             })
         };
-        let materials: Vec<OfMaterial> = (0..first.len())
+        let materials: Vec<MaterialScore> = (0..first.len())
             .flat_map(|m| {
                 let channels = channels.iter().enumerate();
                 channels.filter_map(move |(c, channel)| of_material(m, c, channel))
@@ -497,7 +497,7 @@ mod tests {
         let entries = [Analytic::Lambert, Analytic::GgxOrenNayar].map(|model| {
             let scores = cross_validate(&model, &data, &folds, |_, _| {}).unwrap();
             first = scores.clone();
-            let words = Words {
+            let words = ModelLabel {
                 model: model.name().to_owned(),
                 features: None,
                 target: None,

@@ -19,7 +19,7 @@ use crate::published;
 use crate::quality::NoiseFloor;
 use tables::Measure;
 
-pub use comparison::{Comparison, Entry, OfMaterial, Words};
+pub use comparison::{Comparison, Entry, MaterialScore, ModelLabel};
 
 /// Everything that `reproduce` prints. Its JSON form is this structure, field for field.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -180,7 +180,7 @@ pub struct Summary {
     /// How many materials and channels are better than printed; `None` where nothing is printed.
     pub better_than_paper: Option<Better>,
     /// The same three figures of each seed by itself; one entry for a single seed.
-    pub seeds: Vec<OfSeed>,
+    pub seeds: Vec<SeedScore>,
 }
 
 /// How many materials and channels are held out better than the paper printed them, of those that
@@ -197,7 +197,7 @@ pub struct Better {
 
 /// The summary of one seed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct OfSeed {
+pub struct SeedScore {
     /// The seed.
     pub seed: u64,
     /// As in [`Summary`].
@@ -430,7 +430,7 @@ impl Summary {
             };
             let (rmse_ratio_to_paper, worst_ratio_to_paper) =
                 ratios(rmse().zip(channels().map(|channel| channel.paper)));
-            OfSeed {
+            SeedScore {
                 seed,
                 rmse_ratio_to_paper,
                 mean_held_out_rmse: mean(rmse()).unwrap_or(0.0),

@@ -7,11 +7,11 @@ use elm_brdf::features::Features;
 use elm_brdf::fit::boxed;
 use elm_brdf::link::Link;
 use elm_brdf::model::BrdfParams;
-use elm_brdf::scene_materials::Library;
+use elm_brdf::scene_materials::SceneMaterialLoader;
 
 /// Fitted to CUReT's files in this folder, or to the stand-in.
-pub(crate) fn library(curet: Option<PathBuf>) -> Library {
-    Library::with_network(
+pub(crate) fn library(curet: Option<PathBuf>) -> SceneMaterialLoader {
+    SceneMaterialLoader::with_network(
         curet,
         Box::new(|_| {
             boxed(BrdfParams {

@@ -105,9 +105,9 @@ pub enum Problem {
 
 /// A shape for an error: a file may claim any number of dimensions.
 fn brief(shape: &[u64]) -> String {
-    const MOST: usize = 6;
-    if shape.len() <= MOST {
+    const MAX: usize = 6;
+    if shape.len() <= MAX {
         return format!("{shape:?}");
     }
-    format!("{:?}... ({} dimensions)", &shape[..MOST], shape.len())
+    format!("{:?}... ({} dimensions)", &shape[..MAX], shape.len())
 }

@@ -25,10 +25,10 @@ pub struct List(Vec<String>);
 
 impl List {
     pub(crate) fn of<'a>(names: impl IntoIterator<Item = &'a String>) -> Self {
-        const MOST: usize = 8;
+        const MAX: usize = 8;
         let mut names: Vec<String> = names.into_iter().map(|name| shorten(name)).collect();
-        if names.len() > MOST {
-            names.truncate(MOST);
+        if names.len() > MAX {
+            names.truncate(MAX);
             names.push("...".to_owned());
         }
         Self(names)

@@ -8,7 +8,7 @@ use crate::geometry::DirectionPair;
 use crate::{Samples, channel};
 
 /// Most wavelengths of a table: a column that has more values than this is none of wavelengths.
-const MOST: usize = 1000;
+const MAX: usize = 1000;
 
 /// What can be a wavelength, in nm: from a picometre to a metre.
 const LENGTHS: std::ops::RangeInclusive<f64> = 1e-3..=1e9;
@@ -38,7 +38,7 @@ pub(super) fn pivot(
             distinct.push(wavelength);
             distinct.len() - 1
         });
-        if distinct.len() > MOST {
+        if distinct.len() > MAX {
             return Err((row, wavelength));
         }
     }

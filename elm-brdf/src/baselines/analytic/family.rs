@@ -5,9 +5,9 @@ use std::f64::consts::{FRAC_1_PI, FRAC_PI_2};
 use elm_datasets::lobes::Cosines;
 
 /// The most shape parameters that a model has.
-pub(super) const MOST_SHAPES: usize = 4;
+pub(super) const MAX_SHAPES: usize = 4;
 /// The most terms that a model has.
-pub(super) const MOST_TERMS: usize = 3;
+pub(super) const MAX_TERMS: usize = 3;
 
 /// An analytic model of reflectance; formulas and sources are those of
 /// [`elm_datasets::lobes`].
@@ -165,7 +165,7 @@ impl Analytic {
     }
 
     /// The value of each term for these shape parameters.
-    pub(super) fn basis(self, angles: &Cosines, shapes: &[f64; MOST_SHAPES]) -> [f64; MOST_TERMS] {
+    pub(super) fn basis(self, angles: &Cosines, shapes: &[f64; MAX_SHAPES]) -> [f64; MAX_TERMS] {
         let [first, second, third, fourth] = *shapes;
         match self {
             Self::Lambert => [FRAC_1_PI, 0.0, 0.0],

@@ -9,7 +9,7 @@ use elm_datasets::lobes::Cosines;
 use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 
 pub use family::{Analytic, Shape};
-use family::{MOST_SHAPES, MOST_TERMS};
+use family::{MAX_SHAPES, MAX_TERMS};
 use search::Problem;
 
 use crate::error::Result;
@@ -47,8 +47,8 @@ pub struct AnalyticModel {
 /// The parameters of one channel; entries beyond those of the family are 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Parameters {
-    shapes: [f64; MOST_SHAPES],
-    weights: [f64; MOST_TERMS],
+    shapes: [f64; MAX_SHAPES],
+    weights: [f64; MAX_TERMS],
 }
 
 impl AnalyticModel {

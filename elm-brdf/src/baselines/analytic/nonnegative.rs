@@ -1,14 +1,14 @@
 //! Least squares of up to three weights that are not negative, from the normal equations.
 
-use super::family::MOST_TERMS;
+use super::family::MAX_TERMS;
 
 /// The normal equations of $\min \lVert \Phi w - y \rVert^2$.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Normal {
     /// $\Phi^T \Phi$.
-    pub(super) gram: [[f64; MOST_TERMS]; MOST_TERMS],
+    pub(super) gram: [[f64; MAX_TERMS]; MAX_TERMS],
     /// $\Phi^T y$.
-    pub(super) moments: [f64; MOST_TERMS],
+    pub(super) moments: [f64; MAX_TERMS],
 }
 
 impl Normal {
@@ -18,8 +18,8 @@ impl Normal {
     /// The best weights are the unconstrained ones of those terms that are not 0 in them, so the
     /// best of all subsets whose unconstrained weights are positive is the answer; there are at
     /// most seven.
-    pub(super) fn solve(&self, terms: usize) -> ([f64; MOST_TERMS], f64) {
-        let mut best = ([0.0; MOST_TERMS], 0.0);
+    pub(super) fn solve(&self, terms: usize) -> ([f64; MAX_TERMS], f64) {
+        let mut best = ([0.0; MAX_TERMS], 0.0);
         for subset in 1..1_usize << terms {
             let Some(weights) = self.subset(subset) else {
                 continue;
@@ -35,18 +35,18 @@ impl Normal {
 
     /// The unconstrained weights of the terms in `subset`, a bit per term; `None` where these
     /// terms depend on each other.
-    fn subset(&self, subset: usize) -> Option<[f64; MOST_TERMS]> {
+    fn subset(&self, subset: usize) -> Option<[f64; MAX_TERMS]> {
         let inside = |term: usize| subset >> term & 1 == 1;
         // Rows and columns of the other terms become those of the unit matrix.
-        let mut a = [[0.0; MOST_TERMS]; MOST_TERMS];
-        let mut b = [0.0; MOST_TERMS];
-        for i in 0..MOST_TERMS {
+        let mut a = [[0.0; MAX_TERMS]; MAX_TERMS];
+        let mut b = [0.0; MAX_TERMS];
+        for i in 0..MAX_TERMS {
             if !inside(i) {
                 a[i][i] = 1.0;
                 continue;
             }
             b[i] = self.moments[i];
-            for j in (0..MOST_TERMS).filter(|&j| inside(j)) {
+            for j in (0..MAX_TERMS).filter(|&j| inside(j)) {
                 a[i][j] = self.gram[i][j];
             }
         }
@@ -55,8 +55,8 @@ impl Normal {
         if scale.iter().any(|&s| !(s > 0.0 && s.is_finite())) {
             return None;
         }
-        for i in 0..MOST_TERMS {
-            for j in 0..MOST_TERMS {
+        for i in 0..MAX_TERMS {
+            for j in 0..MAX_TERMS {
                 a[i][j] /= scale[i] * scale[j];
             }
             b[i] /= scale[i];

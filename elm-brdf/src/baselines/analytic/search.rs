@@ -2,7 +2,7 @@
 
 use elm_datasets::lobes::Cosines;
 
-use super::family::{Analytic, MOST_SHAPES, MOST_TERMS};
+use super::family::{Analytic, MAX_SHAPES, MAX_TERMS};
 use super::nonnegative::{Normal, solve};
 
 /// Starts that go down from the grid.
@@ -13,7 +13,7 @@ const STEPS: usize = 50;
 const DIFFERENCE: f64 = 1e-8;
 
 /// Shape parameters as places within their bounds, 0 to 1.
-type Places = [f64; MOST_SHAPES];
+type Places = [f64; MAX_SHAPES];
 
 /// What all channels share: the model, the directions, and the grid's terms.
 pub(super) struct Problem<'a> {
@@ -23,17 +23,17 @@ pub(super) struct Problem<'a> {
 }
 
 struct GridPoint {
-    index: [usize; MOST_SHAPES],
+    index: [usize; MAX_SHAPES],
     places: Places,
-    terms: Vec<[f64; MOST_TERMS]>,
-    gram: [[f64; MOST_TERMS]; MOST_TERMS],
+    terms: Vec<[f64; MAX_TERMS]>,
+    gram: [[f64; MAX_TERMS]; MAX_TERMS],
 }
 
 /// A point of the search: places, weights there, and what they leave.
 #[derive(Clone)]
 struct Fit {
     places: Places,
-    weights: [f64; MOST_TERMS],
+    weights: [f64; MAX_TERMS],
     residual: Vec<f64>,
     error: f64,
 }
@@ -48,7 +48,7 @@ impl<'a> Problem<'a> {
             grid: Vec::new(),
         };
         for number in 0..count {
-            let (mut rest, mut index, mut places) = (number, [0; MOST_SHAPES], [0.0; MOST_SHAPES]);
+            let (mut rest, mut index, mut places) = (number, [0; MAX_SHAPES], [0.0; MAX_SHAPES]);
             for (i, shape) in shapes.iter().enumerate() {
                 index[i] = rest % shape.steps;
                 rest /= shape.steps;
@@ -70,7 +70,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Shape parameters and weights of the smallest squared error that the starts lead to.
-    pub(super) fn fit(&self, measured: &[f64]) -> ([f64; MOST_SHAPES], [f64; MOST_TERMS]) {
+    pub(super) fn fit(&self, measured: &[f64]) -> ([f64; MAX_SHAPES], [f64; MAX_TERMS]) {
         let mut best: Option<Fit> = None;
         for start in self.starts(measured) {
             let found = self.descend(start, measured);
@@ -78,20 +78,20 @@ impl<'a> Problem<'a> {
                 best = Some(found);
             }
         }
-        best.map_or(([0.0; MOST_SHAPES], [0.0; MOST_TERMS]), |best| {
+        best.map_or(([0.0; MAX_SHAPES], [0.0; MAX_TERMS]), |best| {
             (self.shapes(&best.places), best.weights)
         })
     }
 
-    fn shapes(&self, places: &Places) -> [f64; MOST_SHAPES] {
-        let mut values = [0.0; MOST_SHAPES];
+    fn shapes(&self, places: &Places) -> [f64; MAX_SHAPES] {
+        let mut values = [0.0; MAX_SHAPES];
         for (i, shape) in self.family.shapes().iter().enumerate() {
             values[i] = shape.at(places[i]);
         }
         values
     }
 
-    fn terms(&self, places: &Places) -> Vec<[f64; MOST_TERMS]> {
+    fn terms(&self, places: &Places) -> Vec<[f64; MAX_TERMS]> {
         let shapes = self.shapes(places);
         self.angles
             .iter()
@@ -213,8 +213,8 @@ impl<'a> Problem<'a> {
         }
         while *damping < 1e8 {
             // Scaled to a diagonal of 1 + damping (Marquardt's choice).
-            let (mut a, mut b) = ([[0.0; MOST_SHAPES]; MOST_SHAPES], [0.0; MOST_SHAPES]);
-            for i in 0..MOST_SHAPES {
+            let (mut a, mut b) = ([[0.0; MAX_SHAPES]; MAX_SHAPES], [0.0; MAX_SHAPES]);
+            for i in 0..MAX_SHAPES {
                 a[i][i] = 1.0;
                 if fixed(i) {
                     continue;
@@ -242,11 +242,11 @@ impl<'a> Problem<'a> {
     }
 }
 
-fn gram(terms: &[[f64; MOST_TERMS]]) -> [[f64; MOST_TERMS]; MOST_TERMS] {
-    let mut gram = [[0.0; MOST_TERMS]; MOST_TERMS];
+fn gram(terms: &[[f64; MAX_TERMS]]) -> [[f64; MAX_TERMS]; MAX_TERMS] {
+    let mut gram = [[0.0; MAX_TERMS]; MAX_TERMS];
     for term in terms {
-        for i in 0..MOST_TERMS {
-            for j in 0..MOST_TERMS {
+        for i in 0..MAX_TERMS {
+            for j in 0..MAX_TERMS {
                 gram[i][j] += term[i] * term[j];
             }
         }
@@ -254,8 +254,8 @@ fn gram(terms: &[[f64; MOST_TERMS]]) -> [[f64; MOST_TERMS]; MOST_TERMS] {
     gram
 }
 
-fn moments(terms: &[[f64; MOST_TERMS]], measured: &[f64]) -> [f64; MOST_TERMS] {
-    let mut moments = [0.0; MOST_TERMS];
+fn moments(terms: &[[f64; MAX_TERMS]], measured: &[f64]) -> [f64; MAX_TERMS] {
+    let mut moments = [0.0; MAX_TERMS];
     for (term, y) in terms.iter().zip(measured) {
         for (moment, t) in moments.iter_mut().zip(term) {
             *moment += t * y;

@@ -3,14 +3,14 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::{BLUE, Chart, Drawn, GREEN, GREY, PALE, Shown, VERMILION, titled};
+use super::{BLUE, Chart, Drawn, GREEN, GREY, PALE, PredictionPlot, VERMILION, titled};
 use elm_datasets::geometry::DirectionPair;
 
 /// Width of a bin in degrees.
 const WIDTH: f64 = 10.0;
 const BINS: usize = 9;
 /// Fewer errors than this have no mean worth a point.
-const LEAST: usize = 5;
+const MIN: usize = 5;
 
 const ANGLES: [(&str, RGBColor); 3] = [
     ("theta_i, of the light", BLUE),
@@ -36,7 +36,7 @@ fn angles(pair: &DirectionPair) -> [f64; 3] {
 }
 
 impl ByAngle {
-    pub(super) fn new(title: &str, materials: &[Shown<'_>]) -> Self {
+    pub(super) fn new(title: &str, materials: &[PredictionPlot<'_>]) -> Self {
         let mut sums = [[(0.0, 0_usize); BINS]; 3];
         for material in materials {
             let rows = material.measured.rows().into_iter();
@@ -54,7 +54,7 @@ impl ByAngle {
         let curve = |bins: [(f64, usize); BINS]| {
             let points = bins.into_iter().enumerate();
             points
-                .filter(|(_, (sum, count))| *count >= LEAST && sum.is_finite())
+                .filter(|(_, (sum, count))| *count >= MIN && sum.is_finite())
                 .map(|(bin, (sum, count))| {
                     ((bin as f64 + 0.5) * WIDTH, (sum / count as f64).sqrt())
                 })

@@ -4,7 +4,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::{BLUE, Chart, Drawn, ORANGE, PALE, Shown, round_step, titled};
+use super::{BLUE, Chart, Drawn, ORANGE, PALE, PredictionPlot, round_step, titled};
 
 /// Height of a material's bars in pixels.
 const ROW: u32 = 30;
@@ -26,7 +26,7 @@ pub(super) struct Bars {
 }
 
 impl Bars {
-    pub(super) fn new(title: &str, materials: &[Shown<'_>]) -> Self {
+    pub(super) fn new(title: &str, materials: &[PredictionPlot<'_>]) -> Self {
         let rows = materials.iter().map(|material| Row {
             name: material.name.clone(),
             rmse: material.rmse,

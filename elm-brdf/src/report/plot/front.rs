@@ -4,7 +4,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::{BLUE, Chart, Drawn, GREY, ORANGE, PALE, VERMILION, titled};
-use crate::pareto::Point;
+use crate::pareto::CostPoint;
 
 pub(super) struct Front {
     title: String,
@@ -51,9 +51,9 @@ impl Kind {
 }
 
 impl Front {
-    pub(super) fn new(title: &str, error: &str, points: &[Point]) -> Self {
+    pub(super) fn new(title: &str, error: &str, points: &[CostPoint]) -> Self {
         // A logarithmic axis has no place for 0.
-        let place = |point: &Point| {
+        let place = |point: &CostPoint| {
             let (time, error) = (point.nanoseconds_per_evaluation, point.error);
             (time > 0.0 && error > 0.0 && time.is_finite() && error.is_finite())
                 .then_some((time, error))

@@ -34,7 +34,7 @@ use super::{mean, paper};
 use crate::error::{Error, Result};
 use crate::file;
 use crate::fit::Fit;
-use crate::pareto::Point;
+use crate::pareto::CostPoint;
 use crate::protocol::MaterialScores;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::DirectionPair;
@@ -47,11 +47,11 @@ pub(super) const GREY: RGBColor = RGBColor(120, 120, 120);
 pub(super) const PALE: RGBColor = RGBColor(222, 222, 222);
 
 /// A picture of lobes has no more panels than the paper has materials.
-const MOST_PANELS: usize = 15;
+const MAX_PANELS: usize = 15;
 
 /// Measurements of one material, with a prediction of each that was held out when it was made.
 #[derive(Debug, Clone)]
-pub struct Shown<'a> {
+pub struct PredictionPlot<'a> {
     /// The material's name.
     pub name: String,
     /// The pairs of directions.
@@ -68,7 +68,7 @@ pub struct Shown<'a> {
     pub noise_floor: Option<f64>,
 }
 
-impl<'a> Shown<'a> {
+impl<'a> PredictionPlot<'a> {
     /// Samples of one material, with what a cross-validation predicted.
     #[must_use]
     pub fn new(
@@ -118,7 +118,7 @@ impl<'a> Shown<'a> {
 ///
 /// # Errors
 /// [`Error::Write`] naming the file or folder.
-pub fn write(dir: &Path, title: &str, materials: &[Shown<'_>]) -> Result<Vec<PathBuf>> {
+pub fn write(dir: &Path, title: &str, materials: &[PredictionPlot<'_>]) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     let scatter = scatter::Scatter::new(title, materials);
     files.extend(save(&scatter, dir, "predicted-against-measured")?);
@@ -134,7 +134,12 @@ pub fn write(dir: &Path, title: &str, materials: &[Shown<'_>]) -> Result<Vec<Pat
 ///
 /// # Errors
 /// [`Error::Write`] naming the file or folder.
-pub fn write_front(dir: &Path, title: &str, error: &str, points: &[Point]) -> Result<Vec<PathBuf>> {
+pub fn write_front(
+    dir: &Path,
+    title: &str,
+    error: &str,
+    points: &[CostPoint],
+) -> Result<Vec<PathBuf>> {
     save(&front::Front::new(title, error, points), dir, "pareto")
 }
 
@@ -172,7 +177,7 @@ pub fn write_fitted_lobes(
     method: &(impl Fit + ?Sized),
 ) -> Result<Vec<PathBuf>> {
     let mut fitted = Vec::new();
-    for (index, material) in data.materials.iter().take(MOST_PANELS).enumerate() {
+    for (index, material) in data.materials.iter().take(MAX_PANELS).enumerate() {
         let Some(samples) = data.samples(index) else {
             continue;
         };
@@ -308,11 +313,11 @@ mod tests {
         let folds = Folds::new(data.directions.len(), 3, 1).unwrap();
         let scores = cross_validate(&Analytic::GgxLambert, &data, &folds, |_, _| {}).unwrap();
         let pairs = &data.directions;
-        let shown: Vec<Shown<'_>> = data
+        let shown: Vec<PredictionPlot<'_>> = data
             .materials
             .iter()
             .zip(&scores)
-            .map(|(material, scores)| Shown {
+            .map(|(material, scores)| PredictionPlot {
                 name: material.name.clone(),
                 pairs: pairs.clone(),
                 measured: material.values.view(),

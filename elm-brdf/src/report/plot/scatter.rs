@@ -3,12 +3,12 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::{BLUE, Chart, Drawn, PALE, Shown, VERMILION, titled};
+use super::{BLUE, Chart, Drawn, PALE, PredictionPlot, VERMILION, titled};
 
 /// More points than this are thinned out, evenly: a picture does not gain by more.
-const MOST_POINTS: usize = 15_000;
+const MAX_POINTS: usize = 15_000;
 /// The axes span no more than this factor.
-const MOST_SPAN: f64 = 1e7;
+const MAX_SPAN: f64 = 1e7;
 
 pub(super) struct Scatter {
     title: String,
@@ -21,7 +21,7 @@ pub(super) struct Scatter {
 }
 
 impl Scatter {
-    pub(super) fn new(title: &str, materials: &[Shown<'_>]) -> Self {
+    pub(super) fn new(title: &str, materials: &[PredictionPlot<'_>]) -> Self {
         let all: Vec<(f64, f64)> = materials
             .iter()
             .flat_map(|m| m.measured.iter().copied().zip(m.predicted.iter().copied()))
@@ -31,8 +31,8 @@ impl Scatter {
         let most = all.iter().fold(0.0, |most: f64, p| most.max(p.0).max(p.1));
         let most = if most > 0.0 { most } else { 1.0 };
         let least = positive().fold(most, f64::min);
-        let range = (least.max(most / MOST_SPAN) / 1.5, most * 1.5);
-        let step = all.len().div_ceil(MOST_POINTS).max(1);
+        let range = (least.max(most / MAX_SPAN) / 1.5, most * 1.5);
+        let step = all.len().div_ceil(MAX_POINTS).max(1);
         let inside = |value: f64| value.max(range.0);
         Self {
             title: title.to_owned(),

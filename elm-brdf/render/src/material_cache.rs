@@ -9,7 +9,7 @@ use crate::material::Material;
 use crate::scene::Scene;
 
 /// Materials by their index in the scene, in alphabetical order.
-pub(crate) struct Shelf<'a> {
+pub(crate) struct MaterialCache<'a> {
     slots: Vec<Slot<'a>>,
 }
 
@@ -18,13 +18,13 @@ struct Slot<'a> {
     load: Box<dyn Fn() -> Result<LoadedMaterial, LoadError> + Sync + 'a>,
     /// Where the scene describes it.
     place: Place,
-    material: OnceLock<Stocked>,
+    material: OnceLock<CachedMaterial>,
     /// Held while the material is made, so that it is made once.
     making: Mutex<()>,
 }
 
 /// A material that has been made.
-pub(crate) struct Stocked {
+pub(crate) struct CachedMaterial {
     pub(crate) material: Material,
     /// Of one evaluation.
     pub(crate) multiply_adds: usize,
@@ -37,7 +37,7 @@ pub(crate) struct Stocked {
     pub(crate) seconds: f64,
 }
 
-impl<'a> Shelf<'a> {
+impl<'a> MaterialCache<'a> {
     pub(crate) fn new<M: Sync>(scene: &'a Scene<M>, loader: &'a dyn MaterialLoader<M>) -> Self {
         let slots = scene.material.iter().map(|(name, table)| Slot {
             name,
@@ -54,25 +54,25 @@ impl<'a> Shelf<'a> {
     /// A material, made now if it has not been.
     pub(crate) fn get(&self, index: usize) -> Result<&Material> {
         let slot = &self.slots[index];
-        if let Some(stocked) = slot.material.get() {
-            return Ok(&stocked.material);
+        if let Some(cached) = slot.material.get() {
+            return Ok(&cached.material);
         }
         // The lock guards no data that a panic elsewhere could have left half made.
         let _making = slot.making.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(stocked) = slot.material.get() {
-            return Ok(&stocked.material);
+        if let Some(cached) = slot.material.get() {
+            return Ok(&cached.material);
         }
         let made = slot.make()?;
         Ok(&slot.material.get_or_init(|| made).material)
     }
 
     /// Makes every material.
-    pub(crate) fn fill(&self) -> Result<()> {
+    pub(crate) fn load_all(&self) -> Result<()> {
         (0..self.slots.len()).try_for_each(|index| self.get(index).map(drop))
     }
 
     /// Those made so far, in alphabetical order.
-    pub(crate) fn stocked(&self) -> impl Iterator<Item = (&str, Option<&Stocked>)> {
+    pub(crate) fn cached(&self) -> impl Iterator<Item = (&str, Option<&CachedMaterial>)> {
         self.slots
             .iter()
             .map(|slot| (slot.name, slot.material.get()))
@@ -82,14 +82,14 @@ impl<'a> Shelf<'a> {
     pub(crate) fn title<'b>(&'b self, name: &'b str) -> &'b str {
         let slot = self.slots.iter().find(|slot| slot.name == name);
         slot.and_then(|slot| slot.material.get())
-            .and_then(|stocked| stocked.title.as_deref())
+            .and_then(|cached| cached.title.as_deref())
             .unwrap_or(name)
     }
 
     /// The distinct origins of those made so far.
     pub(crate) fn origins(&self) -> Vec<String> {
         let mut origins: Vec<String> = self
-            .stocked()
+            .cached()
             .filter_map(|(_, s)| Some(s?.origin.clone()))
             .collect();
         origins.sort_unstable();
@@ -99,11 +99,11 @@ impl<'a> Shelf<'a> {
 }
 
 impl Slot<'_> {
-    fn make(&self) -> Result<Stocked> {
+    fn make(&self) -> Result<CachedMaterial> {
         let start = Instant::now();
-        let make = || -> Result<Stocked, LoadError> {
+        let make = || -> Result<CachedMaterial, LoadError> {
             let loaded = (self.load)()?;
-            Ok(Stocked {
+            Ok(CachedMaterial {
                 multiply_adds: loaded.multiply_adds,
                 material: Material::new(loaded.brdf, loaded.tint, loaded.conserve_energy)?,
                 origin: loaded.origin,

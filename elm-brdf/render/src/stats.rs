@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// The first four are lossless: the picture is the same bit for bit. The others stay within a
 /// bound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Savings {
+pub struct Optimizations {
     /// Load and train only materials that some ray meets, when it first does.
     pub materials: bool,
     /// Evaluate a material without colour once, not once for each channel.
@@ -24,7 +24,7 @@ pub struct Savings {
     pub samples: bool,
 }
 
-impl Savings {
+impl Optimizations {
     /// Everything.
     pub const ALL: Self = Self {
         materials: true,
@@ -77,7 +77,7 @@ impl Savings {
 
 /// An amount of work.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-pub struct Work {
+pub struct EvalCost {
     /// Evaluations of a model at a pair of directions.
     pub evaluations: u64,
     /// Multiplications and additions in their matrix products.
@@ -88,12 +88,12 @@ pub struct Work {
 
 /// What was done and what was left out.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Account {
+pub struct RenderStats {
     /// Evaluations done.
-    pub done: Work,
+    pub done: EvalCost,
     /// Evaluations left out, by reason. Those of stopped samples are counted at the rate of the
     /// samples before.
-    pub skipped: BTreeMap<String, Work>,
+    pub skipped: BTreeMap<String, EvalCost>,
     /// Materials that the scene defines.
     pub materials_defined: usize,
     /// Those that were loaded or trained, with their evaluations.
@@ -107,14 +107,14 @@ pub struct Account {
     /// Wall-clock and thread seconds by kind of work.
     pub seconds: Seconds,
     /// Which savings were on.
-    pub savings: Option<Savings>,
+    pub savings: Option<Optimizations>,
     /// Worker threads.
     pub threads: usize,
     /// What should be known of the materials, such as an albedo above 1.
     pub notes: Vec<String>,
 }
 
-impl Account {
+impl RenderStats {
     /// Adds the work of a sheet's panel, whose materials are its own.
     pub(crate) fn merge(&mut self, other: &Self, panel: usize) {
         self.done.add(other.done);
@@ -143,7 +143,7 @@ impl Account {
     }
 }
 
-impl Work {
+impl EvalCost {
     fn add(&mut self, other: Self) {
         self.evaluations += other.evaluations;
         self.multiply_adds += other.multiply_adds;
@@ -190,7 +190,7 @@ impl Reason {
 
 /// Counts of one tile; merging does not depend on the order.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Tally {
+pub(crate) struct TileStats {
     /// Evaluations by material.
     pub(crate) evaluations: Vec<u64>,
     /// Evaluations left out by [`Reason`] and material.
@@ -202,7 +202,7 @@ pub(crate) struct Tally {
     pub(crate) tile_seconds: f64,
 }
 
-impl Tally {
+impl TileStats {
     pub(crate) fn new(materials: usize) -> Self {
         Self {
             evaluations: vec![0; materials],
@@ -232,7 +232,7 @@ impl Tally {
 
     /// The account, given the names of the materials and the cost of one evaluation of each that
     /// was loaded.
-    pub(crate) fn account(&self, materials: &[(&str, Option<usize>)]) -> Account {
+    pub(crate) fn account(&self, materials: &[(&str, Option<usize>)]) -> RenderStats {
         let cost = |counts: &[u64]| -> u64 {
             let costs = materials.iter().map(|(_, cost)| cost.unwrap_or(0) as u64);
             counts
@@ -247,15 +247,15 @@ impl Tally {
         } else {
             0.0
         };
-        let work = |counts: &[u64]| -> Work {
+        let work = |counts: &[u64]| -> EvalCost {
             let evaluations = counts.iter().sum();
-            Work {
+            EvalCost {
                 evaluations,
                 multiply_adds: cost(counts),
                 seconds: evaluations as f64 * rate,
             }
         };
-        Account {
+        RenderStats {
             done: work(&self.evaluations),
             skipped: Reason::ALL
                 .into_iter()
@@ -277,12 +277,12 @@ impl Tally {
                 tracing: self.tile_seconds - self.evaluation_seconds,
                 ..Seconds::default()
             },
-            ..Account::default()
+            ..RenderStats::default()
         }
     }
 }
 
-impl std::fmt::Display for Account {
+impl std::fmt::Display for RenderStats {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let used = self.materials_used.len();
         writeln!(
@@ -296,8 +296,8 @@ impl std::fmt::Display for Account {
             self.samples, self.samples_skipped
         )?;
         writeln!(f, "rays        {}", self.rays)?;
-        let line = |f: &mut std::fmt::Formatter<'_>, name: &str, work: &Work| {
-            let Work {
+        let line = |f: &mut std::fmt::Formatter<'_>, name: &str, work: &EvalCost| {
+            let EvalCost {
                 evaluations,
                 multiply_adds,
                 seconds,

@@ -10,16 +10,16 @@ use std::time::Instant;
 use rayon::prelude::*;
 use toml::Spanned;
 
-use crate::account::{Reason, Savings, Tally};
-use crate::batch::Batch;
+use crate::compiled_scene::CompiledScene;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::loader::MaterialLoader;
+use crate::material_cache::MaterialCache;
 use crate::scene::{Image, Scene, Sphere};
-use crate::shelf::Shelf;
+use crate::shading_queue::ShadingQueue;
+use crate::stats::{Optimizations, Reason, TileStats};
 use crate::tracer::{Sample, Tracer};
 use crate::vector::Vec3;
-use crate::world::World;
 use crate::{Options, Rendering};
 
 /// What any bounded saving may cost, in display steps.
@@ -30,7 +30,7 @@ const TILE: u32 = 32;
 /// error can be told.
 const FIRST_SAMPLES: u32 = 4;
 /// Samples of every pixel between looks, so that a tile's samples take a few megabytes.
-const MOST_SAMPLES: u32 = 64;
+const MAX_SAMPLES: u32 = 64;
 
 /// A difference of two pictures that will be shown, enlarged.
 #[derive(Debug, Clone, Copy)]
@@ -71,14 +71,14 @@ pub(crate) fn render<M: Sync>(
             .all(|pair| alike(&pair[0].image, &pair[1].image));
     let worlds = scenes
         .iter()
-        .map(|scene| World::new(scene))
+        .map(|scene| CompiledScene::new(scene))
         .collect::<Result<Vec<_>, _>>()?;
-    let shelves: Vec<Shelf<'_>> = scenes
+    let caches: Vec<MaterialCache<'_>> = scenes
         .iter()
-        .map(|scene| Shelf::new(scene, loader))
+        .map(|scene| MaterialCache::new(scene, loader))
         .collect();
     if !savings.materials {
-        shelves.iter().try_for_each(Shelf::fill)?;
+        caches.iter().try_for_each(MaterialCache::load_all)?;
     }
     // Both pictures of a difference may be off.
     let enlarged = differences
@@ -86,12 +86,16 @@ pub(crate) fn render<M: Sync>(
         .fold(1.0, |most: f64, d| most.max(2.0 * d.factor.abs()));
     let pictures = scenes
         .iter()
-        .zip(worlds.iter().zip(&shelves))
-        .map(|(scene, (world, shelf))| Picture::new(scene, world, shelf, savings, enlarged))
+        .zip(worlds.iter().zip(&caches))
+        .map(|(scene, (world, cache))| Picture::new(scene, world, cache, savings, enlarged))
         .collect();
-    let mut group = Group::new(pictures, differences, savings)?;
-    pool.install(|| group.take_all(progress))?;
-    let mut renderings: Vec<Rendering> = group.pictures.into_iter().map(Picture::finish).collect();
+    let mut pictures_in_step = LockstepRender::new(pictures, differences, savings)?;
+    pool.install(|| pictures_in_step.render_passes(progress))?;
+    let mut renderings: Vec<Rendering> = pictures_in_step
+        .pictures
+        .into_iter()
+        .map(Picture::finish)
+        .collect();
     let seconds = start.elapsed().as_secs_f64() / renderings.len() as f64;
     for Rendering { account, .. } in &mut renderings {
         account.seconds.total = seconds;
@@ -101,21 +105,21 @@ pub(crate) fn render<M: Sync>(
 }
 
 /// Pictures that are made together.
-struct Group<'a> {
+struct LockstepRender<'a> {
     width: u32,
     height: u32,
     samples: u32,
     /// Whether pixels may stop.
-    stop: bool,
+    adaptive: bool,
     pictures: Vec<Picture<'a>>,
     differences: Vec<(Difference, Mutex<Film>)>,
 }
 
-impl<'a> Group<'a> {
+impl<'a> LockstepRender<'a> {
     fn new(
         pictures: Vec<Picture<'a>>,
         differences: &[Difference],
-        savings: Savings,
+        savings: Optimizations,
     ) -> Result<Self> {
         let size = |picture: &Picture<'_>| {
             let image = picture.image;
@@ -132,7 +136,7 @@ impl<'a> Group<'a> {
             width,
             height,
             samples: first.image.samples,
-            stop: savings.samples,
+            adaptive: savings.samples,
             // Only for stopping.
             differences: differences
                 .iter()
@@ -144,7 +148,7 @@ impl<'a> Group<'a> {
     }
 
     /// All samples, in rounds that double, after each of which some pixels stop.
-    fn take_all(&mut self, progress: &(dyn Fn(u64, u64) + Sync)) -> Result<()> {
+    fn render_passes(&mut self, progress: &(dyn Fn(u64, u64) + Sync)) -> Result<()> {
         let pixels = self.width as usize * self.height as usize;
         let each = self.pictures.len() as u64;
         let all = pixels as u64 * u64::from(self.samples) * each;
@@ -156,9 +160,9 @@ impl<'a> Group<'a> {
         let mut taken = 0;
         while taken < self.samples && wanted.contains(&true) {
             let until = match taken {
-                _ if !self.stop => taken + MOST_SAMPLES,
+                _ if !self.adaptive => taken + MAX_SAMPLES,
                 0 => FIRST_SAMPLES,
-                _ => taken + taken.min(MOST_SAMPLES),
+                _ => taken + taken.min(MAX_SAMPLES),
             };
             let until = until.min(self.samples);
             tiles(self.width, self.height)
@@ -174,13 +178,13 @@ impl<'a> Group<'a> {
                     Ok::<(), crate::Error>(())
                 })?;
             taken = until;
-            if self.stop && taken < self.samples {
+            if self.adaptive && taken < self.samples {
                 let before = wanted.iter().filter(|w| **w).count();
-                self.choose(&mut wanted, taken);
+                self.retire_converged(&mut wanted, taken);
                 let stopped = before - wanted.iter().filter(|w| **w).count();
                 let left_out = stopped as u64 * u64::from(self.samples - taken);
                 for picture in &mut self.pictures {
-                    picture.stop(left_out);
+                    picture.skip_remaining(left_out);
                 }
                 report(left_out * each);
             }
@@ -190,7 +194,7 @@ impl<'a> Group<'a> {
 
     /// Leaves of the `wanted` pixels, with `taken` samples each, those that some picture or some
     /// difference needs.
-    fn choose(&mut self, wanted: &mut [bool], taken: u32) {
+    fn retire_converged(&mut self, wanted: &mut [bool], taken: u32) {
         // Sheets are shown at the exposure of their first picture.
         let gain = self.pictures.first().map_or(1.0, |p| p.tracer.gain);
         let films = self
@@ -239,16 +243,16 @@ struct Picture<'a> {
     spheres: &'a [Spanned<Sphere>],
     tracer: Tracer<'a>,
     film: Mutex<Film>,
-    tally: Mutex<Tally>,
+    tally: Mutex<TileStats>,
 }
 
 impl<'a> Picture<'a> {
     /// `enlarged` is the factor on its errors of what is shown of it.
     fn new<M>(
         scene: &'a Scene<M>,
-        world: &'a World,
-        shelf: &'a Shelf<'a>,
-        savings: Savings,
+        world: &'a CompiledScene,
+        cache: &'a MaterialCache<'a>,
+        savings: Optimizations,
         enlarged: f64,
     ) -> Self {
         let image = &scene.image;
@@ -258,7 +262,7 @@ impl<'a> Picture<'a> {
             spheres: &scene.sphere,
             tracer: Tracer {
                 world,
-                shelf,
+                cache,
                 savings,
                 width: image.width,
                 depth: image.depth,
@@ -269,12 +273,12 @@ impl<'a> Picture<'a> {
                 gain,
             },
             film: Mutex::new(Film::new(image.width, image.height)),
-            tally: Mutex::new(Tally::new(world.materials.len())),
+            tally: Mutex::new(TileStats::new(world.materials.len())),
         }
     }
 
     /// Accounts for samples left out, at the mean rate of evaluations so far.
-    fn stop(&mut self, left_out: u64) {
+    fn skip_remaining(&mut self, left_out: u64) {
         let tally = self.tally.get_mut().unwrap_or_else(PoisonError::into_inner);
         let samples = tally.samples.max(1);
         for material in 0..tally.evaluations.len() {
@@ -288,8 +292,8 @@ impl<'a> Picture<'a> {
     /// Takes and returns the samples of a tile.
     fn take(&self, work: &[(u32, Range<u32>)]) -> Result<Vec<Sample>> {
         let start = Instant::now();
-        let mut tally = Tally::new(self.tracer.world.materials.len());
-        let mut batch = Batch::default();
+        let mut tally = TileStats::new(self.tracer.world.materials.len());
+        let mut batch = ShadingQueue::default();
         let mut samples = Vec::new();
         self.tracer
             .samples(work, &mut batch, &mut tally, |sample| samples.push(sample))?;
@@ -315,23 +319,23 @@ impl<'a> Picture<'a> {
             .tally
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner);
-        let shelf = self.tracer.shelf;
-        let materials: Vec<(&str, Option<usize>)> = shelf
-            .stocked()
-            .map(|(name, stocked)| (name, stocked.map(|s| s.multiply_adds)))
+        let cache = self.tracer.cache;
+        let materials: Vec<(&str, Option<usize>)> = cache
+            .cached()
+            .map(|(name, cached)| (name, cached.map(|s| s.multiply_adds)))
             .collect();
         let mut account = tally.account(&materials);
         account.savings = Some(self.tracer.savings);
-        for (name, stocked) in shelf.stocked() {
-            let Some(stocked) = stocked else { continue };
-            account.seconds.materials += stocked.seconds;
-            let noted = stocked.notes.iter();
+        for (name, cached) in cache.cached() {
+            let Some(cached) = cached else { continue };
+            account.seconds.materials += cached.seconds;
+            let noted = cached.notes.iter();
             account
                 .notes
                 .extend(noted.map(|note| format!("material '{name}': {note}")));
-            let albedo = stocked.material.largest_albedo();
+            let albedo = cached.material.largest_albedo();
             if albedo > 1.0 {
-                let rescaled = match stocked.material.is_rescaled() {
+                let rescaled = match cached.material.is_rescaled() {
                     true => ", rescaled to 1",
                     false => "",
                 };
@@ -341,10 +345,10 @@ impl<'a> Picture<'a> {
                 ));
             }
         }
-        let origins = shelf.origins();
-        let titles = shelf
-            .stocked()
-            .filter_map(|(_, stocked)| stocked?.title.clone());
+        let origins = cache.origins();
+        let titles = cache
+            .cached()
+            .filter_map(|(_, cached)| cached?.title.clone());
         let names: Vec<String> = titles.collect();
         Rendering {
             width: image.width,
@@ -371,7 +375,7 @@ impl<'a> Picture<'a> {
                 let sphere = entry.get_ref();
                 let below = Vec3::from(sphere.centre) - camera.up() * sphere.radius * 1.12;
                 let label = sphere.label.as_deref()?;
-                let title = self.tracer.shelf.title(sphere.material.get_ref());
+                let title = self.tracer.cache.title(sphere.material.get_ref());
                 Some((label.replace("{name}", title), camera.project(below)?))
             })
             .collect()

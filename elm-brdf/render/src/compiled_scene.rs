@@ -2,12 +2,12 @@
 
 use crate::bvh::Hierarchy;
 use crate::camera::Camera;
-use crate::environment::{Environment, Panorama};
+use crate::environment::{Environment, EnvironmentMap};
 use crate::error::{Error, Place, Result};
 use crate::light::{Area, Light};
 use crate::mesh;
 use crate::scene::{Scene, Triple};
-use crate::shape::{Form, Ray, SurfacePoint};
+use crate::shape::{Primitive, Ray, SurfacePoint};
 use crate::vector::{BLACK, Rgb, Vec3};
 
 /// Largest picture, in pixels: 8K fits, and takes some three gigabytes while it is made.
@@ -18,7 +18,7 @@ const MAX_LIGHTS: u64 = 1 << 16;
 const MAX_DEPTH: u64 = 64;
 
 /// What rays travel through.
-pub(crate) struct World {
+pub(crate) struct CompiledScene {
     pub(crate) camera: Camera,
     pub(crate) lights: Vec<Light>,
     /// Names of the materials, in the order of their indices.
@@ -66,13 +66,13 @@ pub(crate) enum Hit {
     Nothing,
 }
 
-impl World {
+impl CompiledScene {
     pub(crate) fn new<M>(scene: &Scene<M>) -> Result<Self> {
         check_image(scene)?;
         let mut builder = Builder {
             scene,
             materials: scene.material.keys().cloned().collect(),
-            forms: Vec::new(),
+            primitives: Vec::new(),
             surfaces: Vec::new(),
             lights: Vec::new(),
             objects: 0,
@@ -89,7 +89,7 @@ impl World {
             has_extended_lights: builder.lights.iter().any(Light::has_extent),
             lights: builder.lights,
             materials: builder.materials,
-            hierarchy: Hierarchy::new(builder.forms),
+            hierarchy: Hierarchy::new(builder.primitives),
             surfaces: builder.surfaces,
             environment,
         })
@@ -209,11 +209,11 @@ fn check_image<M>(scene: &Scene<M>) -> Result<()> {
     Ok(())
 }
 
-/// A scene on its way to a [`World`].
+/// A scene on its way to a [`CompiledScene`].
 struct Builder<'a, M> {
     scene: &'a Scene<M>,
     materials: Vec<String>,
-    forms: Vec<Form>,
+    primitives: Vec<Primitive>,
     surfaces: Vec<Surface>,
     lights: Vec<Light>,
     objects: u32,
@@ -267,8 +267,10 @@ impl<M> Builder<'_, M> {
                     let found = "with both file and builtin".to_owned();
                     return Err(wrong(found, "one of them, or neither"));
                 }
-                (Some(file), None) => Some(Panorama::read(&scene.beside(file), light.rotation)?),
-                (None, Some("studio")) => Some(Panorama::studio(light.rotation)),
+                (Some(file), None) => {
+                    Some(EnvironmentMap::read(&scene.beside(file), light.rotation)?)
+                }
+                (None, Some("studio")) => Some(EnvironmentMap::studio(light.rotation)),
                 (None, Some(name)) => return Err(wrong(format!("'{name}'"), "'studio'")),
                 (None, None) => None,
             };
@@ -289,7 +291,7 @@ impl<M> Builder<'_, M> {
             let role = self.reflector(&sphere.material)?;
             let radius = positive(&place, "radius", sphere.radius)?;
             let centre = finite(&place, "centre", sphere.centre)?;
-            self.push([Form::Sphere { centre, radius }], role);
+            self.push([Primitive::Sphere { centre, radius }], role);
         }
         for entry in &scene.plane {
             let place = scene.place(entry);
@@ -297,7 +299,7 @@ impl<M> Builder<'_, M> {
             let role = self.reflector(&plane.material)?;
             let point = finite(&place, "point", plane.point)?;
             let normal = direction(&place, "normal", plane.normal)?;
-            self.push([Form::Plane { point, normal }], role);
+            self.push([Primitive::Plane { point, normal }], role);
         }
         for entry in &scene.rectangle {
             let place = scene.place(entry);
@@ -305,7 +307,7 @@ impl<M> Builder<'_, M> {
             let role = self.reflector(&rectangle.material)?;
             let corner = finite(&place, "corner", rectangle.corner)?;
             let [u, v] = edges(&place, rectangle.edge_u, rectangle.edge_v)?;
-            self.push([Form::Parallelogram { corner, u, v }], role);
+            self.push([Primitive::Parallelogram { corner, u, v }], role);
         }
         for entry in &scene.mesh {
             let place = scene.place(entry);
@@ -331,7 +333,7 @@ impl<M> Builder<'_, M> {
             finite(&place, "translate", shape.translate)?;
             let placed = mesh::placed(triangles, scale, shape.rotate, shape.translate);
             self.push(
-                placed.into_iter().map(|t| Form::Triangle(Box::new(t))),
+                placed.into_iter().map(|t| Primitive::Triangle(Box::new(t))),
                 role,
             );
         }
@@ -350,13 +352,13 @@ impl<M> Builder<'_, M> {
         }
     }
 
-    fn push(&mut self, forms: impl IntoIterator<Item = Form>, role: Role) {
+    fn push(&mut self, primitives: impl IntoIterator<Item = Primitive>, role: Role) {
         let surface = Surface {
             object: self.objects,
             role,
         };
-        self.forms.extend(forms);
-        self.surfaces.resize(self.forms.len(), surface);
+        self.primitives.extend(primitives);
+        self.surfaces.resize(self.primitives.len(), surface);
         self.objects += 1;
     }
 }
@@ -371,10 +373,10 @@ fn wrong(place: &Place, what: &'static str, found: impl ToString, expected: &'st
 }
 
 /// Coordinates beyond this would overflow when squared a few times over.
-const FARTHEST: f64 = 1e30;
+const MAX_DISTANCE: f64 = 1e30;
 
 fn finite(place: &Place, what: &'static str, value: Triple) -> Result<Vec3> {
-    if value.iter().all(|c| c.abs() <= FARTHEST) {
+    if value.iter().all(|c| c.abs() <= MAX_DISTANCE) {
         Ok(value.into())
     } else {
         Err(wrong(
@@ -393,7 +395,7 @@ fn direction(place: &Place, what: &'static str, value: Triple) -> Result<Vec3> {
 }
 
 fn colour(place: &Place, what: &'static str, value: Triple) -> Result<Rgb> {
-    if value.iter().all(|c| (0.0..=FARTHEST).contains(c)) {
+    if value.iter().all(|c| (0.0..=MAX_DISTANCE).contains(c)) {
         Ok(value)
     } else {
         let expected = "three finite numbers, none negative";
@@ -402,7 +404,7 @@ fn colour(place: &Place, what: &'static str, value: Triple) -> Result<Rgb> {
 }
 
 fn positive(place: &Place, what: &'static str, value: f64) -> Result<f64> {
-    if value > 0.0 && value <= FARTHEST {
+    if value > 0.0 && value <= MAX_DISTANCE {
         Ok(value)
     } else {
         Err(wrong(place, what, value, "a finite number above 0"))

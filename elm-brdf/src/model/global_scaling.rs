@@ -16,9 +16,9 @@ use elm_datasets::geometry::DirectionPair;
 /// choice, which is chosen on all rows. By default (the plain [`BrdfParams`]) each fold scales its
 /// own training rows.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ScaledOnce(BrdfParams);
+pub struct GlobalScaling(BrdfParams);
 
-impl ScaledOnce {
+impl GlobalScaling {
     /// # Errors
     /// [`Error::Conflict`] for a link other than [`Link::Identity`], which is fitted to each
     /// fold's values.
@@ -33,7 +33,7 @@ impl ScaledOnce {
     }
 }
 
-impl Fit for ScaledOnce {
+impl Fit for GlobalScaling {
     type Model = BrdfModel;
 
     fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {

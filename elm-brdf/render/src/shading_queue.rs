@@ -2,15 +2,15 @@
 
 use std::time::Instant;
 
-use crate::account::{Reason, Savings, Tally};
 use crate::error::Result;
-use crate::shelf::Shelf;
+use crate::material_cache::MaterialCache;
+use crate::stats::{Optimizations, Reason, TileStats};
 use crate::vector::{BLACK, Rgb};
 use elm_datasets::geometry::DirectionPair;
 
 /// One evaluation that a path waits for.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Request {
+pub(crate) struct EvalRequest {
     pub(crate) material: usize,
     pub(crate) pair: DirectionPair,
     /// Index of the path.
@@ -32,8 +32,8 @@ pub(crate) const CAPACITY: usize = 16_384;
 
 /// Gathered requests and their values.
 #[derive(Default)]
-pub(crate) struct Batch {
-    pub(crate) requests: Vec<Request>,
+pub(crate) struct ShadingQueue {
+    pub(crate) requests: Vec<EvalRequest>,
     /// One per request, once evaluated.
     pub(crate) values: Vec<Rgb>,
     order: Vec<usize>,
@@ -45,7 +45,7 @@ pub(crate) struct Batch {
     found: Vec<Rgb>,
 }
 
-impl Batch {
+impl ShadingQueue {
     pub(crate) fn clear(&mut self) {
         self.requests.clear();
         self.values.clear();
@@ -54,9 +54,9 @@ impl Batch {
     /// Fills [`values`](Self::values), material by material.
     pub(crate) fn evaluate(
         &mut self,
-        shelf: &Shelf<'_>,
-        savings: Savings,
-        tally: &mut Tally,
+        cache: &MaterialCache<'_>,
+        savings: Optimizations,
+        tally: &mut TileStats,
     ) -> Result<()> {
         let Self {
             requests,
@@ -76,7 +76,7 @@ impl Batch {
         order.sort_by_key(|&at| (material_of(at), requests[at].light));
         for group in order.chunk_by(|&a, &b| material_of(a) == material_of(b)) {
             let index = material_of(group[0]);
-            let material = shelf.get(index)?;
+            let material = cache.get(index)?;
             let start = Instant::now();
             pairs.clear();
             pair_of.clear();

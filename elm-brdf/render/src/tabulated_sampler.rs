@@ -23,20 +23,20 @@ const COSINE_SHARE: f64 = 0.1;
 /// The model is taken to be isotropic and symmetric in the azimuth; where it is not, densities
 /// stay densities, and only the noise grows.
 #[derive(Debug, Clone)]
-pub(crate) struct Proxy {
+pub(crate) struct TabulatedSampler {
     views: Vec<Distribution2>,
     albedo: Vec<f64>,
 }
 
 /// What a table is made of: every pair at which the model is asked, by viewing angle.
-pub(crate) struct Survey {
+pub(crate) struct SampleGrid {
     /// Cell by cell, by view, theta_i and azimuth; the steps of a cell one after another.
     pub(crate) cells: Vec<DirectionPair>,
     /// Mirror and retro-reflection at each viewing angle, where models peak.
     pub(crate) peaks: Vec<DirectionPair>,
 }
 
-impl Survey {
+impl SampleGrid {
     pub(crate) fn new() -> Self {
         let pair = |theta_i, phi, theta_o| DirectionPair {
             incident: cartesian(theta_i, phi),
@@ -80,8 +80,8 @@ fn cosines(step: usize) -> (f64, f64) {
     (cosine(step), cosine(step + 1))
 }
 
-impl Proxy {
-    /// From the model's values, finite and not negative, at [`Survey::cells`].
+impl TabulatedSampler {
+    /// From the model's values, finite and not negative, at [`SampleGrid::cells`].
     pub(crate) fn new(values: &[f64]) -> Self {
         let (views, albedo) = values
             .chunks_exact(THETAS * PHIS * STEPS * STEPS)
