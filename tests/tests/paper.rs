@@ -63,12 +63,12 @@ fn with_as_many_neurons_as_rows_equation_10_interpolates_and_agrees_with_equatio
     let rows = &samples.directions[..40];
     let values = samples.values.slice(s![..40, ..]);
     let exact = params(network(30.0).solver(Inverse))
-        .fit(&rows, values)
+        .fit(rows, values)
         .unwrap();
     let least = params(network(30.0).solver(PseudoInverse::default()))
-        .fit(&rows, values)
+        .fit(rows, values)
         .unwrap();
-    let (exact, least) = (exact.eval(&rows).unwrap(), least.eval(&rows).unwrap());
+    let (exact, least) = (exact.eval(rows).unwrap(), least.eval(rows).unwrap());
     assert_abs_diff_eq!(exact, values, epsilon = 1e-9);
     assert_abs_diff_eq!(least, values, epsilon = 1e-9);
 }

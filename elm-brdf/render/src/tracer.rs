@@ -15,11 +15,9 @@ use elm_datasets::geometry::{DirectionPair, Vector};
 
 /// Surfaces after which dim paths may end by chance.
 const ROULETTE_FROM: u32 = 3;
-/// The least cosine between the viewer and a smooth normal, where interpolation tips the normal
-/// away from the viewer.
+/// Least cosine between the viewer and a smooth normal, which interpolation may tip away.
 const MIN_COSINE: f64 = 1e-3;
-
-/// Signatures up to here are of rays that met no surface.
+/// Hashes up to here are of rays that met no surface.
 const MISSED: u64 = 1;
 
 /// Everything that the paths of a picture share.
@@ -446,16 +444,16 @@ impl Tracer<'_> {
     fn flush(
         &self,
         paths: &mut [Path],
-        batch: &mut ShadingQueue,
+        queue: &mut ShadingQueue,
         tally: &mut TileStats,
     ) -> Result<()> {
-        batch.evaluate(self.cache, self.savings, tally)?;
-        for (request, &value) in batch.requests.iter().zip(&batch.values) {
+        queue.evaluate(self.cache, self.savings, tally)?;
+        for (request, &value) in queue.requests.iter().zip(&queue.values) {
             if request.counts {
                 paths[request.path].accumulate(request, value);
             }
         }
-        batch.clear();
+        queue.clear();
         Ok(())
     }
 }

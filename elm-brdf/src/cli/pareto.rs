@@ -217,7 +217,7 @@ fn of_samples(arguments: &Arguments, name: &str, test: Option<&str>) -> Result<S
         }
         None => {
             let folds = Folds::new(all.len(), 5, arguments.seed).map_err(usage)?;
-            let problem = TrainTestSplit::split(&all, values, |row| folds.of_row(row) == 0);
+            let problem = TrainTestSplit::split(all, values, |row| folds.of_row(row) == 0);
             (problem, "judged on a fifth of its rows".to_owned())
         }
     };

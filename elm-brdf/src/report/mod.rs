@@ -2,11 +2,11 @@
 
 mod comparison;
 mod csv;
+mod format;
 pub mod plot;
 mod tables;
 
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use elm_datasets::{MaterialId, Measurements, Origin, Samples};
 use serde::{Deserialize, Serialize};
@@ -20,6 +20,7 @@ use crate::quality::NoiseFloor;
 use tables::Measure;
 
 pub use comparison::{Comparison, Entry, MaterialScore, ModelLabel};
+pub use format::Format;
 
 /// Everything that `reproduce` prints. Its JSON form is this structure, field for field.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -465,60 +466,5 @@ impl Better {
                 correlation: count(Measure::Correlation),
             }
         })
-    }
-}
-
-/// A form of a [`Report`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub enum Format {
-    /// Tables for a terminal.
-    #[default]
-    Table,
-    /// One JSON object.
-    Json,
-    /// One line per material, channel and measure.
-    Csv,
-    /// Tables for a document.
-    Markdown,
-}
-
-impl Format {
-    /// Every form there is.
-    pub const ALL: [Self; 4] = [Self::Table, Self::Json, Self::Csv, Self::Markdown];
-
-    /// The form's name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Table => "table",
-            Self::Json => "json",
-            Self::Csv => "csv",
-            Self::Markdown => "markdown",
-        }
-    }
-
-    fn extension(self) -> &'static str {
-        match self {
-            Self::Table => "txt",
-            Self::Json => "json",
-            Self::Csv => "csv",
-            Self::Markdown => "md",
-        }
-    }
-}
-
-impl FromStr for Format {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|format| format.name() == name)
-            .ok_or_else(|| Error::UnknownName {
-                what: "format",
-                name: name.to_owned(),
-                expected: Self::ALL.map(Self::name).join(", "),
-            })
     }
 }

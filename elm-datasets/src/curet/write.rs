@@ -1,5 +1,6 @@
 //! Numbers to text, in the database's own layout.
 
+use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -136,13 +137,11 @@ fn table_text(directions: &[DirectionPair]) -> String {
     lines.join("\r\n")
 }
 
-/// Half a turn is positive in the database.
+/// Half a turn is positive in the database, where its six decimals are a little more than pi.
 fn azimuth(phi: f64) -> String {
-    let text = format!("{phi:.6}");
-    match text.strip_prefix('-') {
-        Some(half @ "3.141593") => half.to_owned(),
-        _ => text,
-    }
+    const ROUNDING: f64 = 1e-6;
+    let turned = if phi < ROUNDING - PI { phi + TAU } else { phi };
+    format!("{turned:.6}")
 }
 
 /// As the database has it: LF after every line, and a blank before it.
