@@ -101,7 +101,7 @@ pub struct MaterialScores {
 ///
 /// Materials measured at the same directions are fitted together, fold by fold: an extreme
 /// learning machine then factorises one hidden-layer matrix per fold, however many materials
-/// there are; with its inputs [scaled once](crate::model::ScaledOnce), one for all folds.
+/// there are; with its inputs [scaled once](crate::model::GlobalScaling), one for all folds.
 ///
 /// # Errors
 /// Those of the method; [`Error::Folds`] when `folds` was made for another number of
