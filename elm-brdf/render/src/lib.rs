@@ -35,6 +35,7 @@ pub mod scene;
 mod shape;
 mod sheet;
 mod shelf;
+pub mod testing;
 mod together;
 mod tracer;
 mod vector;
@@ -105,3 +106,8 @@ pub fn render<M: Sync>(
     // One for each scene.
     rendered.pop().ok_or(Error::Sheet { panel: 0 })
 }
+
+// The README's code is compiled and run with the documentation tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
