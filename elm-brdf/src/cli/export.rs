@@ -26,7 +26,8 @@ use elm_datasets::geometry::pairs;
 pub(super) struct Arguments {
     /// A saved model, or 'curet:NAME' or 'csv:FILE' for one that is fitted now.
     model: String,
-    /// The file: .glsl, .wgsl, .hlsl, .c, .h (guarded, functions static) or .binary, unless --format says what it is.
+    /// The file: .glsl, .wgsl, .hlsl, .c, .h (guarded, functions static) or .binary, unless
+    /// --format says what it is.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Form of the file.
