@@ -5,6 +5,8 @@
 #[path = "support/browser.rs"]
 mod browser;
 
+use std::sync::LazyLock;
+
 use elm_brdf::gallery::{self, Exhibit, Only, sphere};
 use elm_brdf::model::BrdfModel;
 use elm_brdf::recipes;
@@ -15,7 +17,7 @@ use elm_datasets::{Invalid, MaterialId, synthetic};
 /// Pixels across and down of what the page shows to this test.
 const SIZE: usize = 64;
 
-fn exhibits() -> Vec<Exhibit> {
+static EXHIBITS: LazyLock<Vec<Exhibit>> = LazyLock::new(|| {
     // Rough, shiny, and in between.
     [5, 7, 61]
         .map(|id| {
@@ -33,7 +35,7 @@ fn exhibits() -> Vec<Exhibit> {
             }
         })
         .into()
-}
+});
 
 /// What the page says that it shows, and its pixels.
 struct Shown {
@@ -60,8 +62,8 @@ fn shown(message: &str) -> Shown {
 #[test]
 fn a_gallery_is_a_page_and_a_picture_per_material_that_load_nothing_from_elsewhere() {
     let dir = tempfile::tempdir().unwrap();
-    let exhibits = exhibits();
-    gallery::write(dir.path(), &exhibits, 32, |_| {}).unwrap();
+    let exhibits = &*EXHIBITS;
+    gallery::write(dir.path(), exhibits, 32, |_| {}).unwrap();
     let index = dir.path().join("index.html");
     assert_eq!(
         std::fs::read_dir(dir.path()).unwrap().count(),
@@ -81,8 +83,8 @@ fn the_page_shades_its_sphere_as_the_renderer_does_and_follows_the_mouse() {
         return;
     };
     let dir = tempfile::tempdir().unwrap();
-    let exhibits = exhibits();
-    gallery::write(dir.path(), &exhibits, 32, |_| {}).unwrap();
+    let exhibits = &*EXHIBITS;
+    gallery::write(dir.path(), exhibits, 32, |_| {}).unwrap();
     let index = dir.path().join("index.html");
 
     let mut pictures: Vec<Shown> = Vec::new();
