@@ -1,5 +1,4 @@
-//! What the machine can do on one thread, measured: the limits that other figures are compared
-//! with.
+//! Measures the machine's limits on one thread, which other figures are compared with.
 
 use std::hint::black_box;
 

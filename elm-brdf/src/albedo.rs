@@ -1,4 +1,4 @@
-//! The share of light that a surface returns, by the angle that it comes from.
+//! Directional albedo: the share of light from each angle that a surface returns.
 //!
 //! The directional albedo $\rho(\theta_i) = \int f \cos\theta_o \, d\omega_o$ over the hemisphere of
 //! viewers is at most 1 for every surface that makes no light of its own.
@@ -19,8 +19,8 @@ use elm_datasets::geometry::{DirectionPair, cartesian};
 /// The angles of the light, in degrees, at which a fit looks at the albedo.
 pub const ANGLES: [f64; 7] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0];
 
-/// Nodes of a grid: radii, and angles about the centre over half a turn, the other half being the same
-/// for a surface without a grain.
+/// Nodes of a grid: radii, and angles about the centre over half a turn. The other half is its mirror
+/// image for isotropic surfaces.
 const RADII: usize = 40;
 const TURNS: usize = 24;
 

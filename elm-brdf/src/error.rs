@@ -1,4 +1,4 @@
-//! What can go wrong in this crate; each error is one line that names the place.
+//! The errors of this crate: each is one line that names what failed and what was expected.
 
 use std::path::PathBuf;
 
@@ -105,7 +105,7 @@ pub enum Error {
         /// The measurements there are.
         rows: usize,
     },
-    /// A method is not made for so many measurements.
+    /// More measurements than a method can take.
     #[error("{method} of {rows} measurements: expected at most {most}")]
     TooManyRows {
         /// The method.

@@ -1,4 +1,4 @@
-//! From a pair of directions to the inputs of a network.
+//! Computes the inputs of a network from pairs of directions.
 
 use std::fmt;
 use std::str::FromStr;

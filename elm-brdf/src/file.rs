@@ -1,4 +1,4 @@
-//! Files that are there whole or not at all.
+//! Writes files that are complete or absent, never partial.
 
 use std::fs;
 use std::path::Path;

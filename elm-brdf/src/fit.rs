@@ -1,4 +1,4 @@
-//! What is fitted to measurements, and what comes of it.
+//! The traits of fitting: a method ([`Fit`]) makes a [`Model`] from measurements.
 
 use elm_datasets::Brdf;
 use elm_datasets::brdf::{ArgumentError, EvalError};

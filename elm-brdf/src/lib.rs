@@ -65,3 +65,8 @@ mod streams;
 #[cfg(feature = "render")]
 pub use elm_brdf_render as render;
 pub use error::{Error, Result};
+
+// The README's code is compiled and run with the documentation tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,4 +1,4 @@
-//! Between a BRDF value and the number that the regression is asked to meet.
+//! Transforms BRDF values into regression targets, and back.
 //!
 //! The way back is the plain inverse, so that a model of the mean target gives a BRDF a little below
 //! its mean (Jensen's inequality): by $\sigma^2 / 2$ of it where $\sigma$ is the relative noise, and by

@@ -236,7 +236,7 @@ pub(crate) struct Comparison {
 }
 
 impl Comparison {
-    /// Adds what another says of these of its places.
+    /// Appends the rows `places` of `other`.
     pub(crate) fn extend(&mut self, other: &Self, places: &[usize]) {
         let add = |own: &mut Vec<f64>, other: &[f64]| {
             own.extend(places.iter().map(|&place| other[place]));

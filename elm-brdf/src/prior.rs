@@ -1,4 +1,4 @@
-//! What other materials teach about a new one.
+//! A prior for new materials, learnt from others.
 //!
 //! Materials measured at the same directions are alike: most are brighter towards grazing, most have
 //! their highlight where light is mirrored, and the rig's own errors are the same for all. A

@@ -1,4 +1,4 @@
-//! k-fold cross-validation of anything that can be fitted to measurements.
+//! k-fold cross-validation of any method that fits measurements.
 
 use elm::Stream;
 use elm_datasets::{Material, MaterialId, Measurements, Samples};
@@ -86,7 +86,7 @@ pub struct Scores {
 /// The scores of one material.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MaterialScores {
-    /// The material's number; `None` for samples of one's own.
+    /// The material's number; `None` for samples from a user's file.
     pub id: Option<MaterialId>,
     /// Its name.
     pub name: String,

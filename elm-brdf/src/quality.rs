@@ -1,5 +1,5 @@
-//! What measurements say about their own errors: the noise floor that their reciprocal pairs show,
-//! and values that look saturated.
+//! Estimates the errors of measurements: noise from their reciprocal pairs, and values that look
+//! saturated.
 
 use ndarray::ArrayView1;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,7 @@ const TOLERANCE: f64 = 1e-4;
 const CLUSTER_WIDTH: f64 = 0.1;
 /// The fewest measurements that make a pile.
 const MIN_CLUSTER: usize = 3;
-/// A highlight is at least so many times the median.
+/// A highlight is at least this many times the median.
 const HIGHLIGHT: f64 = 2.0;
 /// By how much, as a factor, the cosines of the light in a pile must differ.
 const SPAN: f64 = 1.2;

@@ -1,4 +1,4 @@
-//! The materials of scenes: what their tables in a scene file may say, and what makes models of them.
+//! Loads the materials of scenes: fitted, saved, measured or analytic.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};

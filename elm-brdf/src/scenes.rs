@@ -1,4 +1,4 @@
-//! Scenes that need no file.
+//! The built-in scenes.
 
 use std::fmt::Write;
 

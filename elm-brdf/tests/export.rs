@@ -1,8 +1,8 @@
 //! Exports say what the model says: C compiled and run, GLSL in WebGL2 and WGSL in WebGPU of a
 //! headless browser, HLSL by way of SPIR-V and WGSL, MERL tables by this project's own reader.
 //!
-//! The compilers and the browser are used where they are installed; without one its test says
-//! 'skipped'. Shaders are at least parsed and validated everywhere.
+//! Tests that need a compiler or a browser are ignored unless asked for (`cargo xtask test
+//! --browser`). Shaders are at least parsed and validated everywhere.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -26,6 +26,7 @@ use elm_datasets::brdf::EvalError;
 use elm_datasets::geometry::{DirectionPair, cartesian};
 use elm_datasets::merl::{Merl, cell};
 use elm_datasets::{Invalid, MaterialId, Samples, synthetic};
+use elm_test_support::{chromium, program};
 use ndarray::ArrayViewMut2;
 use ndarray::s;
 use rand::{Rng, SeedableRng};
@@ -315,9 +316,9 @@ fn sources(language: Language) -> Vec<(String, Box<dyn Brdf>, String)> {
 }
 
 #[test]
+#[ignore = "needs a C compiler"]
 fn c_source_compiles_without_a_warning_and_agrees_with_the_model() {
-    let Some(cc) = browser::program("cc") else {
-        println!("skipped: no C compiler");
+    let Some(cc) = program("cc") else {
         return;
     };
     let dir = tempfile::tempdir().unwrap();
@@ -427,9 +428,9 @@ fn glsl_and_wgsl_sources_parse_and_validate() {
 }
 
 #[test]
+#[ignore = "needs glslangValidator"]
 fn glslang_takes_glsl_of_the_web_and_of_desktops() {
-    let Some(glslang) = browser::program("glslangValidator") else {
-        println!("skipped: no glslangValidator");
+    let Some(glslang) = program("glslangValidator") else {
         return;
     };
     let dir = tempfile::tempdir().unwrap();
@@ -476,9 +477,9 @@ fn hlsl_as_wgsl(glslang: &Path, name: &str, text: &str) -> String {
 }
 
 #[test]
+#[ignore = "needs Chromium and glslangValidator"]
 fn shaders_run_in_a_browser_agree_with_the_model() {
-    let Some(chromium) = browser::chromium() else {
-        println!("skipped: no Chromium");
+    let (Some(chromium), Some(glslang)) = (chromium(), program("glslangValidator")) else {
         return;
     };
     let pairs = directions();
@@ -499,14 +500,9 @@ fn shaders_run_in_a_browser_agree_with_the_model() {
              values[id.x] = vec4<f32>(value, 1.0);\n}}\n"
         )}));
     }
-    match browser::program("glslangValidator") {
-        Some(glslang) => {
-            for (name, _, text) in sources(Language::Hlsl) {
-                let text = hlsl_as_wgsl(&glslang, &name, &text);
-                jobs.push(serde_json::json!({ "language": "hlsl", "name": name, "text": text }));
-            }
-        }
-        None => println!("skipped for HLSL: no glslangValidator"),
+    for (name, _, text) in sources(Language::Hlsl) {
+        let text = hlsl_as_wgsl(&glslang, &name, &text);
+        jobs.push(serde_json::json!({ "language": "hlsl", "name": name, "text": text }));
     }
     let corners: Vec<[[f64; 3]; 2]> = pairs.iter().map(|p| [p.incident, p.outgoing]).collect();
     let data = serde_json::json!({ "jobs": jobs, "pairs": corners });
@@ -530,7 +526,7 @@ fn shaders_run_in_a_browser_agree_with_the_model() {
                     _ => found.push((label, rows.to_vec())),
                 }
             }
-            Some(("skipped", why)) => println!("skipped: {why}"),
+            Some(("skipped", why)) => elm_test_support::skip(why),
             _ => assert_eq!(message, "done", "the page reports an error"),
         }
     }

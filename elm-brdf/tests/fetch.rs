@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::fs;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::thread;
 
 use elm_brdf::fetch::{self, Changed, Error, Fetched};
@@ -290,15 +290,7 @@ fn progress_goes_from_the_page_to_the_last_file() {
 
 /// The real files, with the average in place of the channels, which are not at hand.
 fn real() -> Option<Vec<(String, Vec<u8>)>> {
-    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared");
-    let root = std::env::var_os("ELM_BRDF_DATA").map_or(shared, PathBuf::from);
-    let found = [root.join("curet"), root]
-        .into_iter()
-        .find(|dir| dir.join("abrdf.dat").is_file());
-    let Some(dir) = found else {
-        eprintln!("skipped: no CUReT files in ELM_BRDF_DATA or ../shared");
-        return None;
-    };
+    let dir = elm_test_support::curet()?;
     let read = |name| fs::read(dir.join(name)).unwrap();
     let values = ["abrdf.dat", "rbrdf.dat", "gbrdf.dat", "bbrdf.dat"];
     let mut files = values
@@ -309,6 +301,7 @@ fn real() -> Option<Vec<(String, Vec<u8>)>> {
 }
 
 #[test]
+#[ignore = "needs data: CUReT"]
 fn the_real_files_have_the_sums_known() {
     let Some(files) = real() else { return };
     let dir = tempfile::tempdir().unwrap();

@@ -1,10 +1,8 @@
 //! Fitted reflectance models: sane everywhere, and the same after a file.
 
-// What was skipped is for whoever runs the tests by hand.
-#![allow(clippy::print_stdout, clippy::unwrap_used)]
+#![allow(clippy::unwrap_used)]
 
 use std::f64::consts::{FRAC_PI_2, PI};
-use std::path::{Path, PathBuf};
 
 use elm::{Activation, ElmParams, persist};
 use elm_datasets::{Invalid, MaterialId, OpenOptions, paint, synthetic};
@@ -72,18 +70,16 @@ fn values_are_finite_and_not_negative_for_every_pair_of_directions() {
     }
 }
 
-/// The models of `docs/accuracy.md`, at a million pairs each.
+/// The models of `docs/reports/accuracy.md`, at a million pairs each.
 #[test]
+#[ignore = "needs data: rgl"]
 fn a_million_values_of_each_rgl_material_are_finite_and_not_negative() {
-    let shared = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared");
-    let root = std::env::var_os("ELM_BRDF_DATA").map_or_else(shared, PathBuf::from);
+    let Some(rgl) = elm_test_support::folder("rgl") else {
+        return;
+    };
     let everywhere = directions(1_000_000, 4);
     for material in ["cc_iris_purple_gem", "paper_white", "vch_golden_yellow"] {
-        let file = root.join(format!("rgl/{material}_rgb_train.csv"));
-        if !file.is_file() {
-            println!("skipped: no {}", file.display());
-            continue;
-        }
+        let file = rgl.join(format!("{material}_rgb_train.csv"));
         let samples = elm_datasets::open(&file, &OpenOptions::default())
             .unwrap()
             .samples;

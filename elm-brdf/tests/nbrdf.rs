@@ -1,34 +1,22 @@
-//! The published networks in `nbrdf/` on the materials in `rgl/`, whose README prints their errors;
-//! skipped where these folders are not there. And what is refused.
+//! The published networks in `nbrdf/` on the materials in `rgl/`, whose README prints their errors,
+//! and what is refused.
 
-// What was skipped, and the figures, are for whoever runs the test by hand.
+// The figures are for whoever runs the test by hand.
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 
 use std::fs;
-use std::path::{Path, PathBuf};
 
 use elm_brdf::baselines::Nbrdf;
 use elm_brdf::metrics::Metrics;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::{DirectionPair, cartesian};
 use elm_datasets::{OpenOptions, open};
-
-fn shared() -> Option<PathBuf> {
-    let named = std::env::var_os("ELM_BRDF_DATA").map(PathBuf::from);
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared");
-    let found = named
-        .into_iter()
-        .chain([beside])
-        .find(|dir| dir.join("nbrdf").is_dir() && dir.join("rgl").is_dir());
-    if found.is_none() {
-        println!("skipped: no folder with nbrdf and rgl in it");
-    }
-    found
-}
+use elm_test_support::folder;
 
 #[test]
+#[ignore = "needs data: nbrdf, rgl"]
 fn the_published_networks_have_the_errors_that_are_printed_for_them() {
-    let Some(dir) = shared() else {
+    let (Some(networks), Some(rgl)) = (folder("nbrdf"), folder("rgl")) else {
         return;
     };
     for (material, printed) in [
@@ -36,8 +24,8 @@ fn the_published_networks_have_the_errors_that_are_printed_for_them() {
         ("paper_white", 0.0057),
         ("vch_golden_yellow", 0.0142),
     ] {
-        let network = Nbrdf::read(&dir.join(format!("nbrdf/{material}_rgb.f32"))).unwrap();
-        let file = dir.join(format!("rgl/{material}_rgb_test.csv"));
+        let network = Nbrdf::read(&networks.join(format!("{material}_rgb.f32"))).unwrap();
+        let file = rgl.join(format!("{material}_rgb_test.csv"));
         let samples = open(&file, &OpenOptions::default()).unwrap().samples;
         let pairs = &samples.directions;
         let predicted = network.eval(pairs).unwrap();

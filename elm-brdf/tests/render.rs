@@ -209,7 +209,7 @@ fn lossless_savings_give_the_same_picture_bit_for_bit_on_any_number_of_threads()
 
 #[test]
 fn all_savings_stay_within_half_a_display_step_on_average_and_two_at_most() {
-    // The command that docs/scenes.md names holds the built-in scenes' own sizes to it.
+    // The command of docs/reports/rendering.md holds the built-in scenes' own sizes to it.
     for (name, (width, height)) in
         NAMES
             .into_iter()

@@ -1,29 +1,15 @@
 //! `elm-brdf reproduce` as a user runs it.
 
 // The lint knows test functions, but not the helpers beside them.
-#![allow(clippy::unwrap_used, clippy::print_stderr)]
+#![allow(clippy::unwrap_used)]
 
 mod support;
 
 use std::fs;
-use std::path::{Path, PathBuf};
 
 use elm_datasets::{Invalid, MaterialId, curet, synthetic};
 use serde_json::Value;
 use support::Program;
-
-/// The folder of real CUReT files, or `None` with a word on standard error.
-fn real_curet() -> Option<PathBuf> {
-    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared");
-    let root = std::env::var_os("ELM_BRDF_DATA").map_or(shared, PathBuf::from);
-    let found = [root.join("curet"), root]
-        .into_iter()
-        .find(|dir| dir.join("abrdf.dat").is_file());
-    if found.is_none() {
-        eprintln!("skipped: no CUReT files in ELM_BRDF_DATA or ../shared");
-    }
-    found
-}
 
 fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap()
@@ -71,8 +57,11 @@ fn the_stand_in_gives_json_by_the_schema_without_paper_figures() {
 }
 
 #[test]
+#[ignore = "needs data: CUReT"]
 fn real_measurements_of_all_materials_come_beside_the_papers_figures() {
-    let Some(dir) = real_curet() else { return };
+    let Some(dir) = elm_test_support::curet() else {
+        return;
+    };
     let dir = dir.to_str().unwrap();
     let arguments = [
         "reproduce",
@@ -99,8 +88,11 @@ fn real_measurements_of_all_materials_come_beside_the_papers_figures() {
 }
 
 #[test]
+#[ignore = "needs data: CUReT"]
 fn the_ratio_to_the_paper_agrees_with_an_independent_computation() {
-    let Some(dir) = real_curet() else { return };
+    let Some(dir) = elm_test_support::curet() else {
+        return;
+    };
     let program = Program::new();
     for seed in ["1", "2", "3", "4", "5"] {
         let dir = dir.to_str().unwrap();
@@ -116,7 +108,7 @@ fn the_ratio_to_the_paper_agrees_with_an_independent_computation() {
         let report = json(&program.output(&arguments));
         let ratio = report["summary"]["rmse_ratio_to_paper"].as_f64().unwrap();
         // A NumPy program with the same settings and its own random numbers: 2.68 to 3.57 over
-        // eight seeds (docs/paper.md).
+        // eight seeds (docs/reports/paper.md).
         assert!((2.6..3.8).contains(&ratio), "seed {seed}: {ratio}");
     }
 }
@@ -218,8 +210,11 @@ fn figures_of_several_seeds_are_their_means_with_the_spread_beside_them() {
 }
 
 #[test]
+#[ignore = "needs data: CUReT"]
 fn noise_and_saturation_of_the_real_measurements_are_those_counted_by_hand() {
-    let Some(dir) = real_curet() else { return };
+    let Some(dir) = elm_test_support::curet() else {
+        return;
+    };
     let arguments = [
         "reproduce",
         "--data",
@@ -366,8 +361,11 @@ fn out_writes_every_form_whole() {
 }
 
 #[test]
+#[ignore = "needs data: CUReT"]
 fn every_way_with_invalid_values_works_and_dropping_leaves_rows_out() {
-    let Some(dir) = real_curet() else { return };
+    let Some(dir) = elm_test_support::curet() else {
+        return;
+    };
     let program = Program::new();
     let mut errors = Vec::new();
     for way in ["clamp", "keep", "drop"] {

@@ -1,10 +1,10 @@
 //! Spheres of the RGL materials against the reference pictures in `rgl/`, as that folder's README
 //! describes; skipped where it is not there.
 
-// What was skipped, and the figures, are for whoever runs the test by hand.
+// The figures are for whoever runs the test by hand.
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use elm_brdf::render::{Options, render};
 use elm_brdf::scene_materials::{Scene, SceneMaterialLoader};
@@ -81,16 +81,11 @@ irradiance = [1, 1, 1]
 }
 
 #[test]
+#[ignore = "needs data: rgl"]
 fn learnt_spheres_look_more_like_the_measured_ones_than_nbrdfs() {
-    let root = std::env::var_os("ELM_BRDF_DATA").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared"),
-        PathBuf::from,
-    );
-    let data = root.join("rgl");
-    if !data.is_dir() {
-        println!("skipped: no {}", data.display());
+    let Some(data) = elm_test_support::folder("rgl") else {
         return;
-    }
+    };
     // NBRDF's figures are those of the README.
     for (material, nbrdf) in [
         ("cc_iris_purple_gem_rgb", 20.1),

@@ -1,20 +1,29 @@
 //! What holds of every fitted material that is sampled: directions follow their density, the
 //! albedo is the same whichever way it is found, and light made of nothing is reported.
 
-// What was skipped is for whoever runs the tests by hand.
+// The figures are for whoever runs the tests by hand.
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 
 #[path = "support/networks.rs"]
 mod networks;
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use elm_brdf::render::{Material, MaterialLoader, Optimizations, Options, render};
+use elm::{Activation, ElmParams, solve::Ridge};
+use elm_brdf::features::Features;
+use elm_brdf::fit::Fit;
+use elm_brdf::link::Link;
+use elm_brdf::model::BrdfParams;
+use elm_brdf::registry;
+use elm_brdf::render::{Material, MaterialLoader, Optimizations, Options, render, testing};
 use elm_brdf::scene_materials::{MaterialTable, Scene, SceneMaterialLoader};
 use elm_datasets::curet::MATERIALS;
 use elm_datasets::geometry::{DirectionPair, cartesian};
+use elm_datasets::lobes::Formula;
+use elm_datasets::merl::Merl;
+use elm_datasets::{Brdf, Invalid, MaterialId, synthetic};
 use networks::library;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -39,149 +48,58 @@ fn fitted(curet: Option<&Path>) -> Vec<(usize, Material)> {
 /// Fitted to the stand-in, by the usual recipe.
 static STAND_IN: LazyLock<Vec<(usize, Material)>> = LazyLock::new(|| fitted(None));
 
-/// Fitted to CUReT's files; none where these are not found.
-static CURET: LazyLock<Vec<(usize, Material)>> = LazyLock::new(|| {
-    let shared = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared");
-    let root = std::env::var_os("ELM_BRDF_DATA").map_or_else(shared, PathBuf::from);
-    let folders = [root.join("curet"), root];
-    let found = folders.iter().find(|dir| dir.join("abrdf.dat").is_file());
-    found.map_or_else(
-        || {
-            println!("skipped: no CUReT files in ELM_BRDF_DATA or ../shared");
-            Vec::new()
-        },
-        |dir| fitted(Some(dir)),
-    )
-});
+/// Fitted to CUReT's files; `None` where these are not found.
+static CURET: LazyLock<Option<Vec<(usize, Material)>>> =
+    LazyLock::new(|| elm_test_support::curet().map(|dir| fitted(Some(&dir))));
+
+/// Independent numbers in \[0, 1).
+fn uniform(seed: u64) -> impl FnMut() -> f64 {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    move || random.random()
+}
 
 /// Viewing angles from the normal to next to grazing.
 const VIEWS: [f64; 4] = [0.0, 0.5, 1.2, 1.55];
 
+fn draws_follow_their_density(materials: &[(usize, Material)]) {
+    let mut random = uniform(1);
+    for (id, material) in materials {
+        for view in VIEWS {
+            let found = testing::chi_square(material, cartesian(view, 0.3), &mut random);
+            assert!(found.statistic < found.limit, "{id} at {view}: {found:?}");
+            assert!(
+                (found.total - 1.0).abs() < 1e-9,
+                "{id} at {view}: {found:?}"
+            );
+            assert!(found.density_error < 1e-6, "{id} at {view}: {found:?}");
+        }
+    }
+}
+
 #[test]
 fn directions_drawn_from_every_fitted_material_follow_their_density_by_the_chi_square_test() {
-    let mut random = ChaCha8Rng::seed_from_u64(1);
-    for (id, material) in STAND_IN.iter().chain(&*CURET) {
-        for view in VIEWS {
-            let (statistic, limit) = chi_square(material, view, &mut random);
-            assert!(
-                statistic < limit,
-                "{id}: {statistic} passes {limit} at {view}"
-            );
-        }
-    }
-}
-
-/// The statistic of directions drawn for a view, and what it may be.
-fn chi_square(material: &Material, view: f64, random: &mut ChaCha8Rng) -> (f64, f64) {
-    const THETAS: usize = 6;
-    const PHIS: usize = 8;
-    // A tenth by the cosine is at least four in the emptiest bin, at the horizon.
-    const DRAWS: usize = 5000;
-    // Steps of the density within a bin; the density is constant on each.
-    const FINE: usize = 4;
-    const FINE_PHIS: usize = 8;
-    let outgoing = cartesian(view, 0.3);
-    let mut counts = [0.0; THETAS * PHIS];
-    for _ in 0..DRAWS {
-        let (w, density) = material.sample(outgoing, [random.random(), random.random()]);
-        assert!((material.pdf(outgoing, w) / density - 1.0).abs() < 1e-6);
-        let theta = w[2].acos() / FRAC_PI_2 * THETAS as f64;
-        let phi = (w[1].atan2(w[0]) - 0.3).rem_euclid(TAU) / TAU * PHIS as f64;
-        counts[(theta as usize).min(THETAS - 1) * PHIS + (phi as usize).min(PHIS - 1)] += 1.0;
-    }
-    let mut statistic = 0.0;
-    let mut total = 0.0;
-    for (bin, count) in counts.iter().enumerate() {
-        let mut expected = 0.0;
-        for t in 0..FINE {
-            let theta =
-                |t: usize| (bin / PHIS * FINE + t) as f64 / (THETAS * FINE) as f64 * FRAC_PI_2;
-            let (near, far) = (theta(t).cos(), theta(t + 1).cos());
-            for p in 0..FINE_PHIS {
-                let steps = (PHIS * FINE_PHIS) as f64;
-                let phi = ((bin % PHIS * FINE_PHIS + p) as f64 + 0.5) / steps * TAU;
-                let incident = cartesian(((near + far) / 2.0).acos(), phi + 0.3);
-                let area = (near - far) * TAU / steps;
-                expected += material.pdf(outgoing, incident) * area;
-            }
-        }
-        total += expected;
-        let expected = expected * DRAWS as f64;
-        statistic += (count - expected) * (count - expected) / expected;
-    }
-    assert!(
-        (total - 1.0).abs() < 1e-9,
-        "the density integrates to {total}"
-    );
-    // Wilson and Hilferty's approximation: the cube root of chi-square over its degrees of
-    // freedom is normal. Five deviations are passed once in three million.
-    let freedom = (THETAS * PHIS - 1) as f64;
-    let spread = 2.0 / (9.0 * freedom);
-    (
-        statistic,
-        freedom * (1.0 - spread + 5.0 * spread.sqrt()).powi(3),
-    )
-}
-
-/// What a surface sends towards `outgoing` where light of radiance 1 comes from everywhere: by
-/// quadrature, and by sampling with its standard error.
-fn furnace(material: &Material, theta_o: f64, random: &mut ChaCha8Rng) -> (f64, f64, f64) {
-    const DRAWS: usize = 1000;
-    const THETAS: usize = 90;
-    const PHIS: usize = 36;
-    let outgoing = cartesian(theta_o, 0.0);
-    let luminance = |pairs: &[DirectionPair]| -> Vec<f64> {
-        let values = material.eval(pairs).unwrap();
-        let luminance = |f: &[f64; 3]| 0.2126 * f[0] + 0.7152 * f[1] + 0.0722 * f[2];
-        values.iter().map(luminance).collect()
-    };
-    // Midpoints in both angles, of one half: cells of a degree, as lobes are narrow.
-    let step = FRAC_PI_2 / THETAS as f64;
-    let (mut pairs, mut areas) = (Vec::new(), Vec::new());
-    for i in 0..THETAS {
-        let theta = (i as f64 + 0.5) * step;
-        for j in 0..PHIS {
-            let incident = cartesian(theta, (j as f64 + 0.5) / PHIS as f64 * PI);
-            pairs.push(DirectionPair { incident, outgoing });
-            areas.push(theta.sin() * theta.cos() * step * TAU / PHIS as f64);
-        }
-    }
-    let values = luminance(&pairs);
-    let quadrature: f64 = values
-        .iter()
-        .zip(areas)
-        .map(|(value, area)| value * area)
-        .sum();
-    let (pairs, factors): (Vec<DirectionPair>, Vec<f64>) = (0..DRAWS)
-        .map(|_| {
-            let drawn = material.sample(outgoing, [random.random(), random.random()]);
-            let (incident, density) = drawn;
-            (DirectionPair { incident, outgoing }, incident[2] / density)
-        })
-        .unzip();
-    let weights: Vec<f64> = luminance(&pairs)
-        .iter()
-        .zip(factors)
-        .map(|(value, factor)| value * factor)
-        .collect();
-    let n = DRAWS as f64;
-    let mean = weights.iter().sum::<f64>() / n;
-    let variance = weights.iter().map(|w| (w - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (quadrature, mean, (variance / n).sqrt())
+    draws_follow_their_density(&STAND_IN);
 }
 
 #[test]
-fn in_a_white_furnace_every_fitted_material_sends_its_albedo_whichever_way_it_is_found() {
-    let mut random = ChaCha8Rng::seed_from_u64(2);
+#[ignore = "needs data: CUReT"]
+fn directions_drawn_from_every_measured_material_follow_their_density_by_the_chi_square_test() {
+    draws_follow_their_density(CURET.as_deref().unwrap_or_default());
+}
+
+fn albedos_agree(materials: &[(usize, Material)]) {
+    let mut random = uniform(2);
     let (mut above, mut most): (Vec<usize>, f64) = (Vec::new(), 0.0);
-    for (id, material) in STAND_IN.iter().chain(&*CURET) {
+    for (id, material) in materials {
         for (theta_o, tabulated) in material.albedo() {
-            let (quadrature, mean, deviation) = furnace(material, theta_o, &mut random);
+            let outgoing = cartesian(theta_o, 0.0);
+            let found = testing::white_furnace(material, outgoing, &mut random).unwrap();
+            let quadrature = found.quadrature;
             // Five deviations, and one part in a hundred for the quadrature.
-            let tolerance = 5.0 * deviation + 0.01 * quadrature;
+            let tolerance = 5.0 * found.standard_error + 0.01 * quadrature;
             assert!(
-                (mean - quadrature).abs() <= tolerance,
-                "{id} at {theta_o}: {mean} by sampling, {quadrature}"
+                (found.sampled - quadrature).abs() <= tolerance,
+                "{id} at {theta_o}: {found:?}"
             );
             // The table has 24 x 32 cells.
             assert!(
@@ -195,6 +113,120 @@ fn in_a_white_furnace_every_fitted_material_sends_its_albedo_whichever_way_it_is
         }
     }
     println!("largest albedo {most:.3}; above 1: {above:?}");
+}
+
+#[test]
+fn in_a_white_furnace_every_fitted_material_sends_its_albedo_whichever_way_it_is_found() {
+    albedos_agree(&STAND_IN);
+}
+
+#[test]
+#[ignore = "needs data: CUReT"]
+fn in_a_white_furnace_every_measured_material_sends_its_albedo_whichever_way_it_is_found() {
+    albedos_agree(CURET.as_deref().unwrap_or_default());
+}
+
+/// Directions that are as likely anywhere above the surface.
+fn anywhere(count: usize) -> Vec<DirectionPair> {
+    let mut random = uniform(3);
+    let mut direction = || cartesian(random().acos(), random() * TAU);
+    (0..count)
+        .map(|_| DirectionPair {
+            incident: direction(),
+            outgoing: direction(),
+        })
+        .collect()
+}
+
+/// One of every implementation of `Brdf`: closed forms, a measured table, every baseline, and
+/// networks; and whether it is reciprocal by construction.
+fn every_kind() -> Vec<(String, Box<dyn Brdf>, bool)> {
+    let lambert = || Formula::lambert(0.4).unwrap();
+    let oren_nayar = || Formula::oren_nayar(0.4, 0.5).unwrap();
+    let table = Merl::from_fn(|directions| {
+        let value = lambert().with_ggx(0.3, 0.3).unwrap().at(directions);
+        [value, 0.5 * value, 0.1]
+    });
+    let mut kinds: Vec<(String, Box<dyn Brdf>, bool)> = vec![
+        ("lambert".to_owned(), Box::new(lambert()), true),
+        ("oren-nayar".to_owned(), Box::new(oren_nayar()), true),
+        (
+            "ward".to_owned(),
+            Box::new(oren_nayar().with_ward(0.2, 0.2).unwrap()),
+            true,
+        ),
+        (
+            "ggx".to_owned(),
+            Box::new(lambert().with_ggx(0.04, 0.2).unwrap()),
+            true,
+        ),
+        ("merl".to_owned(), Box::new(table), false),
+    ];
+    let id = MaterialId::new(7).unwrap();
+    let data = synthetic::measurements(1, &[id], Invalid::Clamp);
+    let samples = data.samples(0).unwrap();
+    let pairs = &samples.directions;
+    // One of each kind; they differ in inputs and targets only.
+    let mut missing = vec![
+        "phong",
+        "blinn-phong",
+        "lafortune-2",
+        "koenderink-8",
+        "nearest",
+        "thin-plate",
+        "gaussian-process",
+    ];
+    for reference in registry::baselines() {
+        let Some(index) = missing.iter().position(|name| *name == reference.name) else {
+            continue;
+        };
+        missing.remove(index);
+        let name = reference.full_name();
+        let method = reference.with_row_limit(1).method;
+        let model = method.fit(pairs, samples.values.view()).unwrap();
+        kinds.push((name, Box::new(model), false));
+    }
+    assert!(missing.is_empty(), "{missing:?}");
+    for features in Features::ALL {
+        let params = BrdfParams {
+            features,
+            link: Link::default_log(),
+            network: ElmParams::new(40)
+                .activation(Activation::Tanh)
+                .solver(Ridge::leave_one_out()),
+        };
+        let model = params.fit(pairs, samples.values.view()).unwrap();
+        let name = format!("elm ({})", features.name());
+        kinds.push((name, Box::new(model), features.is_reciprocal()));
+    }
+    kinds
+}
+
+#[test]
+fn every_kind_of_reflectance_passes_chi_square_white_furnace_and_where_it_claims_it_reciprocity() {
+    let mut random = uniform(4);
+    let pairs = anywhere(500);
+    for (name, brdf, reciprocal) in every_kind() {
+        let difference = testing::reciprocity(&*brdf, &pairs).unwrap();
+        println!("{name}: reciprocal to {difference:.1e}");
+        if reciprocal {
+            assert!(difference < 1e-9, "{name}: {difference:e}");
+        }
+        let material = Material::new(brdf, [1.0; 3], false).unwrap();
+        for view in [0.0, 0.6, 1.3] {
+            let outgoing = cartesian(view, 0.3);
+            let fit = testing::chi_square(&material, outgoing, &mut random);
+            assert!(fit.statistic < fit.limit, "{name} at {view}: {fit:?}");
+            assert!((fit.total - 1.0).abs() < 1e-9, "{name} at {view}: {fit:?}");
+            assert!(fit.density_error < 1e-6, "{name} at {view}: {fit:?}");
+            let found = testing::white_furnace(&material, outgoing, &mut random).unwrap();
+            let tolerance = 5.0 * found.standard_error + 0.01 * found.quadrature;
+            assert!(
+                (found.sampled - found.quadrature).abs() <= tolerance,
+                "{name} at {view}: {found:?}"
+            );
+        }
+    }
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! What every reflectance model and every measured table can do.
+//! [`Brdf`], the interface of every reflectance model and every measured table.
 
 use std::any::Any;
 use std::error::Error;
@@ -77,7 +77,7 @@ pub trait Brdf: Any + Send + Sync {
         values: ArrayViewMut2<'_, f64>,
     ) -> Result<(), EvalError>;
 
-    /// As [`eval_into`](Self::eval_into), into an array of its own.
+    /// As [`eval_into`](Self::eval_into), into a new array.
     ///
     /// # Errors
     /// Those of [`eval_into`](Self::eval_into).

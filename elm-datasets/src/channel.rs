@@ -1,4 +1,4 @@
-//! What the name of a channel says: a colour, a wavelength, or nothing that is known here.
+//! Interprets the name of a channel: a colour, a wavelength, or neither.
 //!
 //! Channels of different files are matched by this, never by position.
 

@@ -1,4 +1,4 @@
-//! What can go wrong between a file or a name and an array of numbers.
+//! The errors of reading and checking data.
 
 pub(crate) mod merl;
 pub(crate) mod pbrt;

@@ -1,4 +1,4 @@
-//! Whole files: read at once, put in place at once.
+//! Reads whole files with a limit on their size, and writes files that are complete or absent.
 
 use std::fs;
 use std::io::{self, BufWriter, Read as _, Write};

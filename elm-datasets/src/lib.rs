@@ -5,9 +5,9 @@
 //! - [`synthetic`] makes a set of the same shape from formulas, the models of [`lobes`]. Both give
 //!   [`Measurements`], so that whatever works on one works on the other.
 //! - [`paint`] is a single synthetic material, as glossy as materials get.
-//! - [`open()`] reads [`Samples`] of one material from a file of any format: one's own as CSV
+//! - [`open()`] reads [`Samples`] of one material from a file of any format: your own as CSV
 //!   ([`scattered`]), the [`merl`] and [`rgl`] databases, and [`pbrt`]-v2.
-//! - [`csv`] reads tables of one's own; [`toy`] makes regression problems with known answers.
+//! - [`csv`] reads numeric tables; [`toy`] makes regression problems with known answers.
 //!
 //! Directions are unit vectors in the frame of the surface, which readers make of a file's angles
 //! and writers turn into [`Angles`]; values are BRDF in 1/sr without the cosine. Nothing here panics on bad input: every failure is an [`Error`] that names
@@ -65,3 +65,8 @@ pub use measurements::{Invalid, Material, Measurements, Origin, fill_values};
 pub use open::{Format, OpenOptions, Opened, open};
 pub use samples::Samples;
 pub use sampling::Sampling;
+
+// The README's code is compiled and run with the documentation tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

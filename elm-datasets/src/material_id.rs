@@ -1,4 +1,4 @@
-//! The 61 materials: numbers, names, and finding one by either.
+//! CUReT's 61 materials by number and by name.
 
 use std::fmt;
 use std::str::FromStr;

@@ -1,4 +1,4 @@
-//! Samples from a file of any format that this crate reads.
+//! Reads samples from a file of any format that this crate knows.
 
 use std::fmt;
 use std::fs::File;

@@ -1,4 +1,4 @@
-//! The common currency: pairs of directions with a reflectance value per channel.
+//! Measurements of one material: pairs of directions with a value per channel.
 
 use ndarray::Array2;
 

@@ -1,4 +1,4 @@
-//! Which pairs of directions to look a tabulated BRDF up at.
+//! Chooses pairs of directions at which to evaluate a tabulated BRDF.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -29,8 +29,8 @@ pub enum Sampling {
         seed: u64,
     },
     /// Every combination of the middles of equal steps of `theta_i` and `theta_o` from 0 to pi/2
-    /// and of `phi_o` from 0 to pi, with `phi_i = 0`: the half that a surface without a grain has
-    /// twice.
+    /// and of `phi_o` from 0 to pi, with `phi_i = 0`: half the azimuths, of which the other half
+    /// is the mirror image for isotropic materials.
     Grid {
         /// Steps of each polar angle, at least 1.
         polar: usize,

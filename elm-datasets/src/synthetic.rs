@@ -12,8 +12,9 @@
 //! | 4, 8, 12, ..., 60 | Lustre 01 to Lustre 15 | a coloured GGX lobe alone |
 //! | 61 | Dark 01 | Oren-Nayar, nearly black, with dark current: some values are negative |
 //!
-//! Three of the Matte materials (13, 37 and 57) are so dark that some values are zero. The materials are always the same; the seed makes another set of
-//! measurements of them. No result on them says anything about real materials.
+//! Three of the Matte materials (13, 37 and 57) are so dark that some values are zero. The
+//! materials are always the same; the seed makes another set of measurements of them. No result on
+//! them says anything about real materials.
 
 use std::sync::LazyLock;
 

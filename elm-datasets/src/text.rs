@@ -1,4 +1,4 @@
-//! Pieces of text for messages.
+//! Formats lists and numbers for messages.
 
 /// The names with commas between, or "none". Escaped, for a column's name may hold a line end.
 pub(crate) fn none_or_list<S: AsRef<str>>(names: &[S]) -> String {

@@ -1,4 +1,4 @@
-//! What is known of the real files holds when they are read. Skipped where they are not.
+//! What is known of the real files holds when they are read. Every test here needs them.
 
 #![allow(clippy::unwrap_used, clippy::approx_constant)]
 
@@ -8,7 +8,8 @@ use std::fs;
 
 use elm_datasets::curet::{self, rig};
 use elm_datasets::{Angles, DirectionPair, Invalid, MaterialId, Measurements, Origin};
-use support::{all, real};
+use elm_test_support::curet as real;
+use support::all;
 
 fn read(invalid: Invalid) -> Option<(std::path::PathBuf, Measurements)> {
     let dir = real()?;
@@ -17,6 +18,7 @@ fn read(invalid: Invalid) -> Option<(std::path::PathBuf, Measurements)> {
 }
 
 #[test]
+#[ignore = "needs data: CUReT"]
 fn all_materials_have_all_measurements() {
     let Some((_, set)) = read(Invalid::Clamp) else {
         return;
@@ -31,6 +33,7 @@ fn all_materials_have_all_measurements() {
 }
 
 #[test]
+#[ignore = "needs data: CUReT"]
 fn the_negative_values_are_those_counted_by_hand() {
     let Some((_, kept)) = read(Invalid::Keep) else {
         return;
@@ -60,6 +63,7 @@ fn the_negative_values_are_those_counted_by_hand() {
 }
 
 #[test]
+#[ignore = "needs data: CUReT"]
 fn single_values_are_where_the_file_has_them() {
     let Some((_, set)) = read(Invalid::Keep) else {
         return;
@@ -84,6 +88,7 @@ fn apart(a: &DirectionPair, b: &DirectionPair) -> f64 {
 }
 
 #[test]
+#[ignore = "needs data: CUReT"]
 fn the_rig_has_the_tables_directions_in_the_tables_order() {
     let Some((_, set)) = read(Invalid::Clamp) else {
         return;
@@ -114,6 +119,7 @@ fn the_rig_has_the_tables_directions_in_the_tables_order() {
 }
 
 #[test]
+#[ignore = "needs data: CUReT"]
 fn thirty_pairs_of_measurements_are_reciprocal_and_two_more_nearly() {
     let Some((_, set)) = read(Invalid::Clamp) else {
         return;
@@ -132,6 +138,7 @@ fn thirty_pairs_of_measurements_are_reciprocal_and_two_more_nearly() {
 }
 
 #[test]
+#[ignore = "needs data: CUReT"]
 fn the_angles_reach_as_far_as_stated_and_the_blocks_are_the_stations() {
     let Some((_, set)) = read(Invalid::Clamp) else {
         return;
@@ -155,6 +162,7 @@ fn the_angles_reach_as_far_as_stated_and_the_blocks_are_the_stations() {
 }
 
 #[test]
+#[ignore = "needs data: CUReT"]
 fn written_out_again_the_files_are_the_same_bytes() {
     let Some((dir, set)) = read(Invalid::Keep) else {
         return;
@@ -172,6 +180,7 @@ fn written_out_again_the_files_are_the_same_bytes() {
 }
 
 #[test]
+#[ignore = "needs data: CUReT"]
 fn only_what_is_asked_for_is_read_in_the_order_asked_for() {
     let Some(dir) = real() else { return };
     let ids = [41, 15, 41, 1].map(|number| MaterialId::new(number).unwrap());

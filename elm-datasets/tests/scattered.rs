@@ -187,11 +187,12 @@ fn samples_that_would_not_be_read_back_are_not_written() {
 }
 
 #[test]
+#[ignore = "needs data: rgl"]
 fn real_rgb_samples_are_read_whole_and_fast() {
     for material in ["cc_iris_purple_gem", "paper_white", "vch_golden_yellow"] {
         for (part, rows) in [("train", 20_000), ("test", 6_000)] {
             let name = format!("{material}_rgb_{part}.csv");
-            let Some(path) = support::shared("rgl").map(|dir| dir.join(&name)) else {
+            let Some(path) = elm_test_support::folder("rgl").map(|dir| dir.join(&name)) else {
                 return;
             };
             let start = Instant::now();

@@ -1,4 +1,4 @@
-//! Fitting to rows that arrive in pieces: online, out of core, or from many machines.
+//! Fits to rows that arrive in pieces: online, out of core, or from many machines.
 //!
 //! ```
 //! use elm::{Accumulator, ElmParams, Scaler};

@@ -20,7 +20,7 @@
 //!
 //! - [`ElmParams`] holds the settings, [`Elm`] the fitted network, [`Predictor`]
 //!   its weights packed for evaluation.
-//! - [`Activation`] is the neurons' function, one of eight or your own; [`Kind`] says what it is
+//! - [`Activation`] is the neurons' function, one of nine or your own; [`Kind`] says what it is
 //!   applied to, a weighted sum or the distance from a centre. [`Neurons`] of several kinds may
 //!   stand in one layer.
 //! - [`solve`] has the solvers: equations 10 and 11 of the ELM literature, and ridge regression

@@ -1,8 +1,9 @@
-//! Whether there is room for an array, asked before it is made: a failed allocation ends the program.
+//! Checks that there is room for an array before it is allocated: a failed allocation ends the
+//! program.
 //!
-//! The allocator alone does not say. Linux grants memory that there is none of, and ends whoever uses
-//! it; so large arrays are held against what the system says is available, to this program's control
-//! group, too.
+//! The allocator alone does not tell. Linux grants memory that does not exist, and kills the program
+//! that uses it. Large arrays are therefore compared with the memory that the system reports as
+//! available, to this program's control group, too.
 
 use crate::error::{Error, Result};
 
@@ -18,7 +19,7 @@ pub(crate) fn check_room(what: &'static str, rows: usize, columns: usize) -> Res
     check_copies(what, rows, columns, 1)
 }
 
-/// As [`check_room`], for so many arrays of this size at a time.
+/// As [`check_room`], for several arrays of this size at a time.
 pub(crate) fn check_copies(
     what: &'static str,
     rows: usize,

@@ -1,4 +1,4 @@
-//! The fitted network: the random layer of equation 7 with the output weights that were found.
+//! The fitted network: a feature map and its output weights.
 
 use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};

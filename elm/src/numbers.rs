@@ -1,4 +1,4 @@
-//! Numbers in files: JSON knows neither infinity nor NaN, and what writes it makes `null` of both.
+//! Infinity and NaN in JSON files, which have neither.
 
 use serde::ser::{Error as _, Serializer};
 use serde::{Deserialize, Deserializer, Serialize};

@@ -1,4 +1,4 @@
-//! Pruning: a small network out of a large one.
+//! Pruning: keeps the most useful neurons of a large network.
 //!
 //! What evaluation costs is its neurons, and of random neurons most are of little use. Drawn in
 //! plenty, and all but the most useful struck out, a given number of neurons is far more accurate
@@ -75,7 +75,7 @@ use crate::solve::{Lambda, LeastSquares, Ridge};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Keep {
-    /// Exactly so many neurons.
+    /// Exactly this number of neurons.
     Neurons(usize),
     /// As few neurons as keep the leave-one-out RMSE within 1 plus this times that of all: 0.05 for
     /// a loss of 5 %. Of several outputs, the root mean square of their RMSEs, each relative to the
@@ -302,7 +302,7 @@ impl<'a> Elimination<'a> {
         })
     }
 
-    /// Whether so many have gone that what is left is better computed anew.
+    /// Whether so few neurons remain that recomputing the inverse is cheaper than updating it.
     fn is_due(&self) -> bool {
         4 * self.columns.len() < 3 * self.inverse.nrows()
     }

@@ -1,4 +1,4 @@
-//! The floating-point types that a network can be made of.
+//! [`Scalar`]: the floating-point types that a network can use.
 
 use std::iter::Sum;
 

@@ -1,4 +1,4 @@
-//! The streams of random numbers that one seed has, so that no two uses share one.
+//! The streams of random numbers that a seed has, so that no two uses share one.
 //!
 //! ```
 //! use elm::Stream;

@@ -1,4 +1,4 @@
-//! How far a prediction can be trusted.
+//! Standard deviations and intervals of predictions.
 //!
 //! Two answers, from the factorisation that found the output weights:
 //!
@@ -20,9 +20,9 @@
 //! Outside the training rows neither knows how the function goes on. Both then add what it may change
 //! by between the edge of the data, where predictions are [held](crate::bounds), and the row: with
 //! $e_j$ the distance beyond the range of input $j$ and $g_j$ the slope of the network along it, at
-//! the edge or as a root mean square over the training rows, whichever is steeper, $r = (\sum_j g_j^2 e_j^2)^{1/2}$ as one more independent
-//! deviation, and $6r$ at either end of an interval. That is an assumption, that the function is no
-//! steeper outside than inside, and not a guarantee.
+//! the edge or as a root mean square over the training rows, whichever is steeper,
+//! $r = (\sum_j g_j^2 e_j^2)^{1/2}$ as one more independent deviation, and $6r$ at either end of an
+//! interval. This assumes that the function is no steeper outside than inside; it is no guarantee.
 //!
 //! Both take the random layer, its standardisation and $\lambda$ as given. Where these were chosen on
 //! the same rows, as $\lambda$ is by default and everything by [`ElmParams::auto`], nothing is

@@ -1,5 +1,5 @@
 //! The default fit on problems that break linear algebra, held to the bars of
-//! `docs/stability.md`; the same cases as the program `stress`, at fewer seeds.
+//! `docs/reports/stability.md`; the same cases as the program `stress`, at fewer seeds.
 
 #![allow(clippy::unwrap_used)]
 
@@ -10,7 +10,7 @@ use elm_benches::stress::{Method, Precision, Settings, run};
 use ndarray::Array2;
 
 /// The cases whose noise is above a hundred roundings of the type. Below that it is rounding that
-/// decides how close a fit comes to the oracle; `docs/stability.md` has those figures too.
+/// decides how close a fit comes to the oracle; `docs/reports/stability.md` has those figures too.
 fn noisy(epsilon: f64) -> Vec<Case> {
     let noisy = |case: &&Case| case.problem(1).noise > 100.0 * epsilon;
     CASES.iter().filter(noisy).copied().collect()

@@ -1,4 +1,4 @@
-//! What `ElmParams::auto` says outside of the rows that it was fitted to.
+//! What `ElmParams::auto` predicts outside the rows that it was fitted to.
 
 use elm::ElmParams;
 use ndarray::{Array2, Axis};

@@ -1,5 +1,5 @@
 //! Whether fitted networks return more light than they receive: the largest directional albedo of the
-//! default network of every material, the table of 'Energy' in `docs/accuracy.md`.
+//! default network of every material, the table of 'Energy' in `docs/reports/accuracy.md`.
 //!
 //! `cargo run --release -p elm-benches --bin albedo -- CURET_DIR SEEDS [FILE...]`
 //!

@@ -1,6 +1,6 @@
 //! Error against the number of measurements of a new material, with a prior from the others and
 //! without, at random directions and at those that the prior asks for first: the table of 'Few
-//! measurements' in `docs/accuracy.md`.
+//! measurements' in `docs/reports/accuracy.md`.
 //!
 //! `cargo run --release -p elm-benches --bin few -- CURET_DIR [SEEDS]`
 

@@ -1,5 +1,5 @@
 //! What being reciprocal by construction costs: the tuned network on every set of inputs, the table
-//! of 'Reciprocal or not' in `docs/accuracy.md`.
+//! of 'Reciprocal or not' in `docs/reports/accuracy.md`.
 //!
 //! `cargo run --release -p elm-benches --bin inputs -- CURET_DIR [SEEDS]`
 

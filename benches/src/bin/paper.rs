@@ -1,5 +1,5 @@
 //! How the paper's method fares by number of neurons, over several seeds: the table of
-//! `docs/paper.md`.
+//! `docs/reports/paper.md`.
 //!
 //! `cargo run --release -p elm-benches --bin paper -- CURET_DIR`
 

@@ -1,5 +1,5 @@
 //! Which protocol comes closest to the paper's printed tables, and whether the printed figures fit
-//! together: the tables of "What the printed figures are" in `docs/paper.md`.
+//! together: the tables of "What the printed figures are" in `docs/reports/paper.md`.
 //!
 //! `cargo run --release -p elm-benches --bin printed -- CURET_DIR`
 

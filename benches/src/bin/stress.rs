@@ -1,7 +1,7 @@
 //! Every solver on least-squares problems that break linear algebra: the tables and the curve of
-//! `docs/stability.md`.
+//! `docs/reports/stability.md`.
 //!
-//! `cargo run --release -p elm-benches --bin stress -- --out docs/stability.md`; for OpenBLAS with
+//! `cargo run --release -p elm-benches --bin stress -- --out docs/reports/stability.md`; for OpenBLAS with
 //! `--no-default-features --features openblas-system` before the `--`.
 
 #![allow(clippy::print_stdout)]

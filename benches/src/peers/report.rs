@@ -1,4 +1,4 @@
-//! What the comparison says: a table, or JSON.
+//! Writes the comparison with other libraries as a table or as JSON.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,5 @@
-//! Who is compared, and the two that run in this process: this project and the crate elm.
+//! The libraries that are compared, and the two that run in this process: this project and the
+//! crate elm.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! The problems.
+//! The regression problems of the stress suite, each drawn from a seed.
 
 use ndarray::{Array1, Array2, Axis, concatenate, s};
 use rand::{Rng, SeedableRng};

@@ -1,4 +1,4 @@
-//! The curve of error against condition number.
+//! Draws error against condition number, for every solver.
 
 use std::error::Error;
 use std::ops::Range;

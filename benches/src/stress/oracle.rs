@@ -1,4 +1,4 @@
-//! The best that a hidden-layer matrix allows.
+//! The smallest test error that any ridge strength or cut-off reaches on a hidden-layer matrix.
 
 use faer::Mat;
 use ndarray::{Array1, Array2, ArrayView2, Axis};

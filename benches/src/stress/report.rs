@@ -1,4 +1,4 @@
-//! Records as JSON and as Markdown.
+//! Writes the stress suite's records as JSON and as Markdown.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,4 @@
-//! Every solver on every problem.
+//! Runs every solver on every problem of the stress suite.
 
 use elm::solve::{Diagnosis, Inverse, LeastSquares, PseudoInverse, Ridge, Solution, Solver};
 use elm::{Elm, ElmParams, Scalar};

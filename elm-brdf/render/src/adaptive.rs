@@ -192,8 +192,8 @@ impl<'a> LockstepRender<'a> {
         Ok(())
     }
 
-    /// Leaves of the `wanted` pixels, with `taken` samples each, those that some picture or some
-    /// difference needs.
+    /// Keeps only the `wanted` pixels, with `taken` samples each, that have not converged in some
+    /// picture or difference.
     fn retire_converged(&mut self, wanted: &mut [bool], taken: u32) {
         // Sheets are shown at the exposure of their first picture.
         let gain = self.pictures.first().map_or(1.0, |p| p.tracer.gain);

@@ -1,5 +1,5 @@
-//! Finding what a ray meets among many forms: the `bvh` crate's hierarchy, walked with a distance
-//! bound and without allocation.
+//! Finds the nearest intersection of a ray with many shapes: the `bvh` crate's hierarchy, walked
+//! with a distance bound and without allocation.
 
 use bvh::aabb::{Aabb, Bounded};
 use bvh::bounding_hierarchy::BHShape;

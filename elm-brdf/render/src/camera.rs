@@ -1,4 +1,4 @@
-//! From a point of the picture to a ray, and back.
+//! Maps points of the picture to rays, and back.
 
 use crate::error::{Error, Result};
 use crate::scene::{self, Scene};

@@ -1,4 +1,5 @@
-//! A scene made ready: checked, with its forms in a hierarchy and its files read.
+//! Compiles a scene for rendering: checks it, reads its files, and puts its shapes into a
+//! hierarchy.
 
 use crate::bvh::Hierarchy;
 use crate::camera::Camera;

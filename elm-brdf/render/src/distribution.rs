@@ -1,4 +1,4 @@
-//! Drawing from a piecewise constant density on the unit square.
+//! Samples a piecewise constant density on the unit square.
 
 /// A density that is constant on each cell of a grid over $[0, 1]^2$.
 #[derive(Debug, Clone)]

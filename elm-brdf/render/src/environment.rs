@@ -1,4 +1,4 @@
-//! Light from everywhere: constant, or a picture in latitude and longitude.
+//! Light from infinity: constant, or a picture in latitude and longitude.
 
 use std::f64::consts::{PI, TAU};
 use std::path::Path;

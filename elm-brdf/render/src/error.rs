@@ -1,4 +1,5 @@
-//! What can be wrong with a scene; each error is one line that names the place.
+//! What can be wrong with a scene: each error is one line that names the file, the line and what
+//! was expected.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! The picture while it is made: sums of samples, and which pixels need more of them.
+//! Accumulates samples per pixel, and estimates which pixels need more of them.
 
 use rayon::prelude::*;
 
@@ -24,7 +24,8 @@ struct Pixel {
     visibility_hash: u64,
     /// Whether its samples have different signatures.
     has_edge: bool,
-    /// Whether chance chose more than the places of its samples.
+    /// Whether its samples used randomness beyond their position in the pixel: a light point or a
+    /// direction.
     is_stochastic: bool,
 }
 

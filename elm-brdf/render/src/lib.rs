@@ -37,6 +37,7 @@ mod shape;
 mod sheet;
 mod stats;
 mod tabulated_sampler;
+pub mod testing;
 mod tracer;
 mod vector;
 
@@ -105,3 +106,8 @@ pub fn render<M: Sync>(
     // One for each scene.
     rendered.pop().ok_or(Error::Sheet { panel: 0 })
 }
+
+// The README's code is compiled and run with the documentation tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,4 +1,5 @@
-//! Lights: what they send to a point, how to sample them, and the most that they can contribute.
+//! Lights: the light that they send to a point, how to sample them, and the most that they can
+//! contribute.
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! Where the reflectance of a scene's materials comes from.
+//! The interface that a scene gets its materials' reflectance through.
 
 use std::error::Error;
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! A material as the renderer uses it: any [`Brdf`] made safe, with a way to sample it.
+//! Prepares any [`Brdf`] for rendering: bounds its values, and samples directions in proportion to
+//! them.
 
 use ndarray::ArrayViewMut2;
 
@@ -46,8 +47,8 @@ impl Material {
     /// is scaled down so that no directional albedo passes 1.
     ///
     /// # Errors
-    /// [`Error::Channels`] for a model of another number of channels, [`Error::Tint`]; whatever the model's own
-    /// evaluation reports.
+    /// [`Error::Channels`] for a model of another number of channels, [`Error::Tint`]; whatever the
+    /// model's own evaluation reports.
     pub fn new(brdf: Box<dyn Brdf>, tint: Rgb, conserve_energy: bool) -> Result<Self> {
         let channels = brdf.channels();
         if channels != 1 && channels != 3 {

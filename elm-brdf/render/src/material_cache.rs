@@ -1,4 +1,4 @@
-//! The materials of a scene, each made when it is first needed.
+//! The materials of a scene, each loaded when it is first needed.
 
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Instant;

@@ -1,4 +1,4 @@
-//! Triangle meshes, from OBJ files and from a formula.
+//! Triangle meshes, read from OBJ files or computed from a formula.
 
 use std::f64::consts::TAU;
 use std::path::Path;

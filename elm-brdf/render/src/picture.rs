@@ -1,4 +1,4 @@
-//! From radiance to files: the display's curve, words, PNG and OpenEXR.
+//! Turns radiance into picture files: the display's curve, captions, PNG and OpenEXR.
 
 use std::io::Cursor;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Evaluations gathered from many paths and carried out by material.
+//! Gathers evaluations from many paths and carries them out by material.
 
 use std::time::Instant;
 

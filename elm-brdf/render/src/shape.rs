@@ -1,4 +1,4 @@
-//! Rays, and what they meet: spheres, planes, parallelograms and triangles.
+//! Rays and their intersections with spheres, planes, parallelograms and triangles.
 
 use crate::vector::Vec3;
 

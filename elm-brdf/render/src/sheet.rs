@@ -1,4 +1,4 @@
-//! Several pictures as one.
+//! Renders several pictures as panels of one.
 
 use crate::adaptive::{self, Difference};
 use crate::error::{Error, Result};
@@ -69,7 +69,7 @@ impl<M> Sheet<M> {
             })
     }
 
-    /// Makes the whole sheet about so many pixels across and down.
+    /// Sets the size of the whole sheet, in pixels, approximately.
     pub fn resize(&mut self, width: u32, height: u32) {
         let columns = self.columns.max(1) as u32;
         let rows = self.panels.len().div_ceil(columns as usize).max(1) as u32;
@@ -78,8 +78,8 @@ impl<M> Sheet<M> {
         }
     }
 
-    /// Renders every panel, as [`render`](super::render) does one scene; all have the size and the exposure of
-    /// the first.
+    /// Renders every panel, as [`render`](super::render) does one scene; all have the size and the
+    /// exposure of the first.
     ///
     /// # Errors
     /// As [`render`](super::render); [`Error::Sheet`] for panels of different sizes, and for a difference

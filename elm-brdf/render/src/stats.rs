@@ -1,4 +1,4 @@
-//! What a render did, and what it could leave out.
+//! Counts the work that a render did and the work that it skipped, by reason.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Drawing directions where a model reflects much: a table of any model, piecewise constant.
+//! Samples directions in proportion to a model, by a piecewise constant table of its values.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

@@ -48,7 +48,7 @@ pub(crate) struct Sample {
     /// The shape that was met and the lights without extent that reach it, as a hash; equal where
     /// no edge lies between.
     pub(crate) visibility_hash: u64,
-    /// Whether chance chose more than the place in the pixel: a point on a light, or a direction.
+    /// Whether it used randomness beyond its position in the pixel: a light point or a direction.
     pub(crate) is_stochastic: bool,
 }
 

@@ -10,9 +10,10 @@
 //! | [`GaussianProcess`] | inputs, smoothness of each | the measurements |
 //! | [`Nbrdf`]: a published network, read from its weights | half and difference vectors | 675 for three channels |
 //!
-//! Every one but the last implements [`Fit`](crate::fit::Fit), treats each channel by itself (so none pools materials), shares
-//! factorisations between channels, and returns a [`Brdf`](elm_datasets::Brdf) that is finite, not
-//! negative, and 0 where light or viewer is at or below the horizon.
+//! Every one but the last implements [`Fit`](crate::fit::Fit), treats each channel by itself (so
+//! none pools materials), shares factorisations between channels, and returns a
+//! [`Brdf`](elm_datasets::Brdf) that is finite, not negative, and 0 where light or viewer is at or
+//! below the horizon.
 //!
 //! ```
 //! use elm_brdf::protocol::{Folds, cross_validate};

@@ -28,8 +28,9 @@ const CHANNELS: usize = 3;
 /// have trained is [read](Self::read).
 ///
 /// Evaluated by the layers that this project's own networks are
-/// [evaluated by](crate::batch), in `f32`, and without an angle: with $s = \omega_i + \omega_o$ the sines and cosines
-/// of $\theta_h$ and $\varphi_h$ are quotients of lengths, for a square root and a division each.
+/// [evaluated by](crate::batch), in `f32`, and without an angle: with $s = \omega_i + \omega_o$ the
+/// sines and cosines of $\theta_h$ and $\varphi_h$ are quotients of lengths, for a square root and
+/// a division each.
 #[derive(Debug, Clone)]
 pub struct Nbrdf {
     /// From the five inputs that are not always 0.

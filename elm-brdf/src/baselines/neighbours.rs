@@ -30,7 +30,7 @@ pub struct Neighbours {
 
 const POWERS: std::ops::RangeInclusive<i32> = 1..=8;
 
-/// With more rows than this, leave-one-out is measured on so many of them, evenly spread.
+/// The most rows that leave-one-out is measured on, evenly spread over all.
 const MAX_TRIALS: usize = 1000;
 
 /// Measurements kept by [`Neighbours`].

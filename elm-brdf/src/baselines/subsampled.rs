@@ -1,4 +1,4 @@
-//! Methods that are given a limited number of measurements.
+//! Limits the number of measurements that a method is given.
 
 use ndarray::{ArrayView2, Axis};
 use rand::seq::index;

@@ -17,7 +17,7 @@ pub(crate) struct Dense<A> {
     /// By [`TOGETHER`] neurons: their biases, then for each input their weights; filled up with
     /// neurons of weight 0.
     weights: Vec<A>,
-    /// Numbers in `weights` of so many neurons.
+    /// Numbers in `weights` per block of neurons.
     stride: usize,
 }
 

@@ -1,4 +1,4 @@
-//! What several commands need.
+//! Arguments and helpers that several commands share.
 
 use std::fmt::Display;
 use std::io::{self, IsTerminal};

@@ -1,4 +1,4 @@
-//! `elm-brdf compare`: every model by the same folds, in one table.
+//! `elm-brdf compare`: cross-validates every model on the same folds, in one table.
 
 use std::path::PathBuf;
 use std::time::Instant;

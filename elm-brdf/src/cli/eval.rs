@@ -1,4 +1,4 @@
-//! `elm-brdf eval`: how well a saved model meets measurements.
+//! `elm-brdf eval`: errors of a saved model on measurements.
 
 use std::path::PathBuf;
 

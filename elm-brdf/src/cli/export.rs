@@ -25,7 +25,8 @@ use crate::scene_materials::MaterialTable;
 pub(super) struct Arguments {
     /// A saved model, or 'curet:NAME' or 'csv:FILE' for one that is fitted now.
     model: String,
-    /// The file: .glsl, .wgsl, .hlsl, .c, .h (guarded, functions static) or .binary, unless --format says what it is.
+    /// The file: .glsl, .wgsl, .hlsl, .c, .h (guarded, functions static) or .binary, unless
+    /// --format says what it is.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Form of the file.

@@ -33,7 +33,7 @@ struct Curet {
     /// Folder for the files; by default this program's folder in the user's cache.
     #[arg(long, value_name = "DIR")]
     to: Option<PathBuf>,
-    /// Take files that are whole but not those that results have been printed for.
+    /// Accept complete files whose checksums differ from those used for the published results.
     #[arg(long)]
     accept_changed: bool,
 }

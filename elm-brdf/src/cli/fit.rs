@@ -1,4 +1,4 @@
-//! `elm-brdf fit`: a model of one's own measurements, in a file.
+//! `elm-brdf fit`: fits a model to measurements and saves it.
 
 use std::path::PathBuf;
 use std::time::Instant;

@@ -54,7 +54,8 @@ pub(super) fn named(name: &str, seed: u64) -> Result<ModelEntry, Failure> {
     }
 }
 
-/// The models of these names: with the inputs and target in brackets that a table prints, or on all the inputs and targets that they come with.
+/// The models of these names. A name with inputs and target in brackets, as tables print it, is
+/// one model; a name alone is that model on every set of inputs and targets that it comes with.
 pub(super) fn select(list: &str, seed: u64) -> Result<Vec<ModelEntry>, Failure> {
     let mut models = registry::all(seed);
     if list.trim() == "all" {

@@ -1,4 +1,4 @@
-//! No command writes over what it reads.
+//! Refuses to write over a file that the same command reads.
 
 use std::path::{Path, PathBuf};
 

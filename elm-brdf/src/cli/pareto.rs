@@ -27,9 +27,9 @@ use crate::report::plot;
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Samples of one material: a file (CSV, MERL .binary, RGL .bsdf, pbrt-v2 .brdf), curet:NAME or
-    /// synthetic:paint. May be given several times: each material then has a folder of its own. A
-    /// file NAME_train.csv is judged on NAME_test.csv beside it, where that is; any other on a fifth
-    /// of its rows, drawn by the seed, which are then not fitted to.
+    /// synthetic:paint. May be given several times: each material then gets its own folder. A file
+    /// NAME_train.csv is tested on NAME_test.csv if that exists; otherwise a random fifth of the
+    /// rows, drawn by the seed, is held out.
     #[arg(long, value_name = "SAMPLES", conflicts_with = "materials")]
     samples: Vec<String>,
     /// File of samples that judge; once for each --samples.

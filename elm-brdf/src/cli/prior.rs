@@ -1,4 +1,4 @@
-//! `elm-brdf prior`: what other materials teach, in a file.
+//! `elm-brdf prior`: learns a prior from other materials and saves it.
 
 use std::path::PathBuf;
 

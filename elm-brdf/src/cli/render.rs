@@ -19,8 +19,8 @@ use crate::scenes::builtin;
 /// Render a scene with learnt materials.
 ///
 /// SCENE is a TOML file or a built-in scene: builtin:materials, builtin:contact-sheet,
-/// builtin:comparison or builtin:mesh. Measurements are looked for as by 'reproduce'; without CUReT's files its materials come from the built-in
-/// stand-in, and the caption says so.
+/// builtin:comparison or builtin:mesh. Measurements are looked for as by 'reproduce'; without
+/// CUReT's files its materials come from the built-in stand-in, and the caption says so.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// TOML file, or builtin:NAME.

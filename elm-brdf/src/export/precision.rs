@@ -160,7 +160,7 @@ struct Sum {
 }
 
 impl Sum {
-    /// Adds a term that is off by so many roundings.
+    /// Adds a term whose error is `roundings` roundings.
     fn add(&mut self, term: f32, roundings: f64) {
         self.total += term;
         let partial = f64::from(self.total);

@@ -1,4 +1,4 @@
-//! A model's channels by what they are called.
+//! Matches the channels of a model by name, colour or wavelength.
 
 use elm::Elm;
 use elm_datasets::{Samples, channel};

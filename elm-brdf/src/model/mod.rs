@@ -181,8 +181,8 @@ impl BrdfModel {
 }
 
 impl BrdfParams {
-    /// The paper's: its six inputs, the value itself for a target, so many sigmoid neurons (eq. 7,
-    /// which has no constant term), and the pseudo-inverse (eq. 11).
+    /// The paper's settings: its six inputs, the value itself as target, `neurons` sigmoid neurons
+    /// (eq. 7, which has no constant term), and the pseudo-inverse (eq. 11).
     #[must_use]
     pub fn paper(neurons: usize) -> Self {
         Self {

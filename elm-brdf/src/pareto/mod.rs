@@ -3,8 +3,9 @@
 //!
 //! An **evaluation** is one pair of directions with all channels of one material, in a batch, on
 //! one thread, from directions to reflectance. Networks and NBRDF are timed by
-//! [columns](crate::batch), all other models by [`Brdf::eval`](elm_datasets::Brdf::eval). The models take turns, so that what
-//! else the machine does meets all of them, and each has the median of its turns.
+//! [columns](crate::batch), all other models by [`Brdf::eval`](elm_datasets::Brdf::eval). The
+//! models take turns, so that what else the machine does meets all of them, and each has the median
+//! of its turns.
 //!
 //! A model is on the **front** where no other is both as exact and as fast, and better in one.
 

@@ -1,4 +1,4 @@
-//! Time per evaluation, the models taking turns.
+//! Measures the time per evaluation, with the models taking turns.
 
 use std::any::Any;
 use std::hint::black_box;

@@ -1,4 +1,4 @@
-//! Which directions to measure of a material that is to be fitted with a prior.
+//! Chooses which directions to measure of a material that is fitted with a prior.
 
 use ndarray::{Array1, Axis, Zip};
 

@@ -18,7 +18,7 @@ pub fn baselines() -> Vec<ModelEntry> {
     with_candidates(GaussianProcess::CANDIDATES)
 }
 
-/// The same with so many candidates for the length scales of Gaussian processes.
+/// The same with `candidates` length scales to choose from for Gaussian processes.
 pub(crate) fn with_candidates(candidates: usize) -> Vec<ModelEntry> {
     let mut all: Vec<ModelEntry> = Analytic::ALL
         .into_iter()

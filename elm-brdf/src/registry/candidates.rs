@@ -1,4 +1,4 @@
-//! Every model that the project can fit, networks in many sizes.
+//! Lists every model that the project can fit, for the comparison of run time with error.
 
 use elm::Activation;
 

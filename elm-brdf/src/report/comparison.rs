@@ -67,7 +67,7 @@ pub struct Entry {
 /// The error of one model on one channel of one material.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MaterialScore {
-    /// CUReT's number; `None` for samples of one's own.
+    /// CUReT's number; `None` for samples from a user's file.
     pub id: Option<usize>,
     /// The material's name.
     pub name: String,

@@ -1,22 +1,8 @@
-//! A headless Chromium, where there is one.
+//! A page opened in a headless Chromium.
 
 use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
-
-/// The browser's program, found in PATH.
-pub(crate) fn chromium() -> Option<PathBuf> {
-    ["chromium", "chromium-browser", "google-chrome"]
-        .into_iter()
-        .find_map(program)
-}
-
-/// A program in PATH.
-pub(crate) fn program(name: &str) -> Option<PathBuf> {
-    std::env::split_paths(&std::env::var_os("PATH")?)
-        .map(|dir| dir.join(name))
-        .find(|path| path.is_file())
-}
 
 /// Opens a file, with what may follow its name, and returns what the page says on its console, up
 /// to the first message that is `last`. Errors of the page are messages as well.

@@ -1,4 +1,4 @@
-//! Text to numbers, with an error that names file, line and what was expected.
+//! Parses CUReT's text files; an error names file, line and what was expected.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::path::Path;

@@ -8,10 +8,10 @@
 //! seven stations.
 //!
 //! The lattice is an octahedron with a corner at the lamp, its faces halved three times and drawn
-//! out onto the sphere: 64 normals above the lamp's horizon. That the real apparatus used this lattice is inferred from the
-//! database's `table.txt`, which these directions match to its printed precision (measurements 27
-//! to 30, with the lamp equally high, stand in another order there). Thirty pairs of measurements
-//! are reciprocal to each other, ten measurements to themselves.
+//! out onto the sphere: 64 normals above the lamp's horizon. That the real apparatus used this
+//! lattice is inferred from the database's `table.txt`, which these directions match to its printed
+//! precision (measurements 27 to 30, with the lamp equally high, stand in another order there).
+//! Thirty pairs of measurements are reciprocal to each other, ten measurements to themselves.
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! Numbers to text, in the database's own layout.
+//! Writes files in CUReT's layout.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;

@@ -1,4 +1,4 @@
-//! What was assumed of a table.
+//! Notes on the assumptions made while reading a table.
 
 use std::fmt;
 

@@ -1,8 +1,8 @@
 //! What the tests of files share.
-#![allow(dead_code, unreachable_pub, clippy::unwrap_used, clippy::print_stderr)]
+#![allow(dead_code, unreachable_pub, clippy::unwrap_used)]
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use elm_datasets::{Invalid, MaterialId, curet, synthetic};
 use proptest::prelude::*;
@@ -24,31 +24,6 @@ pub fn change(dir: &Path, file: &str, edit: impl FnOnce(Vec<u8>) -> Vec<u8>) {
     let path = dir.join(file);
     let bytes = edit(fs::read(&path).unwrap());
     fs::write(&path, bytes).unwrap();
-}
-
-/// The database's folder, or `None` after saying that the test is skipped.
-pub fn real() -> Option<PathBuf> {
-    let shared = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared");
-    let given = std::env::var_os("ELM_BRDF_DATA").map_or_else(|| shared.into(), PathBuf::from);
-    let found = [given.join("curet"), given.clone()]
-        .into_iter()
-        .find(|dir| curet::is_present(dir));
-    if found.is_none() {
-        eprintln!("skipped: no CUReT files in {}", given.display());
-    }
-    found
-}
-
-/// A folder of the shared data, or `None` after saying that the test is skipped.
-pub fn shared(name: &str) -> Option<PathBuf> {
-    let shared = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared");
-    let given = std::env::var_os("ELM_BRDF_DATA").map_or_else(|| shared.into(), PathBuf::from);
-    let dir = given.join(name);
-    if dir.is_dir() {
-        return Some(dir);
-    }
-    eprintln!("skipped: no {}", dir.display());
-    None
 }
 
 /// A place, a byte, and whether it replaces, is inserted or removes.

@@ -1,4 +1,4 @@
-//! Fitting to an iterator of chunks, on one thread or on several.
+//! Fits to an iterator of chunks of rows, on one thread or on several.
 
 use ndarray::{Array2, Axis, concatenate};
 #[cfg(feature = "rayon")]
@@ -27,8 +27,8 @@ const SAMPLE_ROWS: usize = 1000;
 /// Inputs and targets of some rows.
 type Chunk<A> = (Array2<A>, Array2<A>);
 
-/// The first chunks, so many that they have [`SAMPLE_ROWS`] rows between them, and an accumulator
-/// made for rows like these.
+/// The first chunks, up to [`SAMPLE_ROWS`] rows in total, and an accumulator made for rows like
+/// these.
 fn start<A: Scalar, E: From<Error>>(
     params: &CheckedParams<A>,
     scaler: Option<Scaler<A>>,
@@ -77,8 +77,8 @@ impl<A: Scalar> CheckedParams<A> {
     /// targets as [`fit`](Self::fit) takes them, or the error of whatever reads them. Leave-one-out is
     /// replaced; see [`Accumulator`].
     ///
-    /// Inputs are standardised by the **first** chunks, so many that they have a thousand rows
-    /// between them, which are in memory together until then. The others should be like them: an
+    /// Inputs are standardised by the **first** chunks, up to a thousand rows in total, which are in
+    /// memory together until then. The others should be like them: an
     /// input that was constant and no longer is, or now lies far outside, is an
     /// [error](Accumulator::push). Rows in an order of their own, by time or place, are better measured
     /// first, all of them: [`fit_chunks_scaled`](Self::fit_chunks_scaled).
@@ -89,7 +89,8 @@ impl<A: Scalar> CheckedParams<A> {
     ///
     /// // Stands for a file that is read piece by piece.
     /// let chunks = (0..10).map(|chunk| {
-    ///     let x = Array2::from_shape_fn((50, 2), |(i, j)| ((chunk * 50 + i) as f64 * (0.1 + j as f64)).sin());
+    ///     let row = |i: usize| (50 * chunk + i) as f64;
+    ///     let x = Array2::from_shape_fn((50, 2), |(i, j)| (row(i) * (0.1 + j as f64)).sin());
     ///     let t = Array2::from_shape_fn((50, 1), |(i, _)| x[[i, 0]] * x[[i, 1]]);
     ///     Ok::<_, Error>((x, t))
     /// });

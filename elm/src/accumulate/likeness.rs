@@ -1,4 +1,4 @@
-//! Whether rows are like those that the standardisation of their inputs was measured on.
+//! Checks that new rows resemble those that the standardisation was measured on.
 //!
 //! A scaler that was measured on too few rows, or on others, does harm without a trace in the fit: an
 //! input that was constant there is lost, and one that hardly varied is magnified until every neuron
@@ -12,10 +12,10 @@ use crate::scalar::Scalar;
 
 /// Deviations from the mean beyond which a value is far off.
 const FAR: f64 = 10.0;
-/// One row in so many may be far off in an input: by Chebyshev's inequality no more are, of any
-/// distribution that has the scaler's mean and deviation.
+/// One row in this many may be far off in an input: by Chebyshev's inequality no distribution with the
+/// scaler's mean and deviation has more.
 const ROWS_PER_FAR: u64 = 100;
-/// So many may be in any case: a few impossible values are no other distribution.
+/// This many may be far off in any case: a few impossible values are not another distribution.
 const FAR_AT_LEAST: u64 = 10;
 
 impl<A: Scalar> Accumulator<A> {

@@ -1,4 +1,4 @@
-//! An accumulator from outside, before its parts are known to fit together.
+//! The parts of a saved accumulator, before they are checked against each other.
 
 use ndarray::{Array1, Array2, Axis};
 use serde::Deserialize;

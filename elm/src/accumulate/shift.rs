@@ -1,4 +1,4 @@
-//! What is taken off the columns before they enter the triangle.
+//! The constants that are subtracted from columns before they enter the triangle.
 //!
 //! Centring a column by the column of ones costs as many digits as its mean has over its deviation.
 //! Columns are therefore taken less a value near their mean, which is known from the first rows. What

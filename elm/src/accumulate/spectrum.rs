@@ -1,4 +1,4 @@
-//! From the triangle to the problem that a batch fit would have prepared.
+//! Converts an accumulator's triangle into the problem that a batch fit would have prepared.
 
 use ndarray::{Array1, ArrayView1, Axis, s};
 

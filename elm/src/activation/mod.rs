@@ -19,7 +19,7 @@ use crate::simd::Level;
 /// The function that a hidden neuron applies to its weighted sum $z = w \cdot x + b$.
 ///
 /// An enum rather than a type parameter: a fitted network keeps one type, serialises its
-/// activation as a name, and can be chosen at run time. A function of one's own goes in through
+/// activation as a name, and can be chosen at run time. Your own function goes in through
 /// [`Activation::custom`].
 ///
 /// ```

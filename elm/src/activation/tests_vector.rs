@@ -185,7 +185,8 @@ fn with_references(
     let mut consts = Consts::new().unwrap();
     arguments
         .filter(|z| z.is_finite())
-        // Beyond, values are 0, 1/2, 1 or the argument: see `tiny_and_huge_arguments_agree_with_the_standard_library`.
+        // Beyond, values are 0, 1/2, 1 or the argument: see
+        // `tiny_and_huge_arguments_agree_with_the_standard_library`.
         .filter(|z| (1e-20..1e9).contains(&z.abs()))
         .map(|z| (z, reference(function, z, &mut consts)))
         .collect()

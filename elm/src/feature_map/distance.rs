@@ -1,4 +1,4 @@
-//! Distances of rows from the centres of radial neurons.
+//! Squared distances of rows from the centres of radial neurons.
 
 use ndarray::{Array2, ArrayView2};
 use pulp::{Simd, WithSimd};

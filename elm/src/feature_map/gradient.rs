@@ -1,4 +1,4 @@
-//! How steep weighted sums of a layer's neurons are along its inputs.
+//! Gradients of weighted sums of neurons with respect to the inputs.
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
 

@@ -15,7 +15,7 @@ pub enum Distribution {
     Uniform,
     /// Normal with mean 0 and variance 1.
     Normal,
-    /// Multivariate Student $t$ with so many degrees of freedom $\nu$, at least 1: the normal weights
+    /// Multivariate Student $t$ with $\nu \ge 1$ degrees of freedom: the normal weights
     /// of a neuron (not its bias) divided by one $\sqrt{\chi^2_\nu / \nu}$, so that some neurons are
     /// much steeper than most. Sine neurons with $\nu$ of 3 or 5 are random features of Matérn's
     /// covariance 3/2 or 5/2 (Rahimi and Recht, 2007).
@@ -59,9 +59,9 @@ pub enum Kind {
     #[default]
     Projection,
     /// The distance $\lVert s \odot (x - c_k) \rVert$ from a centre, a training row drawn for the
-    /// neuron (no row twice until all are taken; in proportion to its weight), with each input multiplied by the scale of the
-    /// weights, $s$. With [`Activation::Gaussian`] this is a radial basis function
-    /// $e^{-\lVert s \odot (x - c_k) \rVert^2}$, whose width is the scale's inverse.
+    /// neuron (no row twice until all are taken; in proportion to its weight), with each input
+    /// multiplied by the scale of the weights, $s$. With [`Activation::Gaussian`] this is a radial
+    /// basis function $e^{-\lVert s \odot (x - c_k) \rVert^2}$, whose width is the scale's inverse.
     Radial,
 }
 

@@ -1,4 +1,4 @@
-//! What a feature map is drawn from.
+//! The settings and the seed that a feature map is drawn from.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,8 +7,8 @@ use crate::activation::Activation;
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 
-/// The settings that a [`FeatureMap`](super::FeatureMap) is drawn from; part of [`ElmParams`](crate::ElmParams), whose
-/// setters describe them.
+/// The settings that a [`FeatureMap`](super::FeatureMap) is drawn from; part of
+/// [`ElmParams`](crate::ElmParams), whose setters describe them.
 ///
 /// Whoever keeps these settings, and the scaler of the training rows, need not keep the random weights.
 ///

@@ -1,4 +1,4 @@
-//! Drawing the random layer from a seed.
+//! Draws the random layer from a seed.
 
 use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, s};
 use rand::Rng;

@@ -240,7 +240,7 @@ const NO_INPUTS: Error = Error::Empty {
 };
 
 impl<A: Scalar> ScalerBuilder<A> {
-    /// For rows of so many inputs.
+    /// For rows of this number of inputs.
     ///
     /// # Errors
     /// [`Error::Empty`] without inputs.

@@ -283,7 +283,7 @@ fn solve_square<A: RealField + Copy + Zero + PartialEq>(
 
 /// Bytes in a row of a block of columns: a whole number of the product's own tiles.
 const BLOCK_BYTES: usize = 384;
-/// For so many blocks, or fewer, copying costs what it brings.
+/// Up to this number of blocks, copying costs as much as it saves.
 const FEW_BLOCKS: usize = 5;
 
 fn add_gram<A: RealField + Copy + Zero>(

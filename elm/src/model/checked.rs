@@ -1,4 +1,4 @@
-//! Settings that are in range, and what can be done with them.
+//! Settings whose ranges are checked, and every way to fit with them.
 
 use ndarray::{Array2, ArrayRef2, ArrayView1, ArrayView2};
 
@@ -281,7 +281,7 @@ impl<A: Scalar> CheckedParams<A> {
     }
 }
 
-/// Whether there is room to fit so many neurons to these rows.
+/// Whether there is room to fit `neurons` neurons to these rows.
 fn check_size<A: Scalar>(x: ArrayView2<'_, A>, neurons: usize) -> Result<()> {
     // Asked before anything is drawn, as a failed allocation would abort the program. Where rows
     // outnumber neurons the matrix itself may not be needed.

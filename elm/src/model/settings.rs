@@ -1,4 +1,4 @@
-//! Settings as files: what [`ElmParams`] are in JSON and the like, and in binary.
+//! Reads and writes settings: [`ElmParams`] as JSON and in binary.
 //!
 //! Where people read it every setting has the name of its setter, and one that is missing its default:
 //! `{"neurons": 20}` will do. Binary forms, which know no names, have all fields in order.
@@ -67,7 +67,7 @@ fn yes() -> bool {
     true
 }
 
-/// How many neurons; or, as files had it before there were names, all that there is to say of them.
+/// The number of neurons or, as in older files, all settings of the neurons.
 enum Count<A: Scalar> {
     Number(usize),
     Neurons(Neurons<A>),

@@ -1,4 +1,4 @@
-//! Fits of pruned layers.
+//! Fits of pruned networks.
 
 use ndarray::{ArrayRef2, ArrayView1, Axis};
 

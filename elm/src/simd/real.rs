@@ -73,9 +73,9 @@ pub trait Real: Copy + Send + Sync + 'static {
         b: Self::Register<S>,
     ) -> Self::Register<S>;
     fn reduce_max<S: Simd>(simd: S, a: Self::Register<S>) -> Self;
-    /// Whole registers of a slice and what is left over.
+    /// Whole registers of a slice, and the remaining entries.
     fn registers<S: Simd>(slice: &[Self]) -> (&[Self::Register<S>], &[Self]);
-    /// Whole registers of a slice and what is left over.
+    /// Whole registers of a slice, and the remaining entries.
     fn registers_mut<S: Simd>(slice: &mut [Self]) -> (&mut [Self::Register<S>], &mut [Self]);
 }
 

@@ -87,7 +87,8 @@ impl<A: Scalar> DesignSvd<A> {
         Self::decompose(Route::QrSvd, r.view(), qtb, residual_ss, frame)
     }
 
-    /// `residual_ss` is what of each output's sum of squares is not in `targets`.
+    /// `residual_ss`: per output, the residual sum of squares outside the column space, which is
+    /// already removed from `targets`.
     fn decompose(
         route: Route,
         hidden: ArrayView2<'_, A>,

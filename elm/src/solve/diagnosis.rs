@@ -1,4 +1,4 @@
-//! What a solver reports beside the weights.
+//! What a solver reports beside the weights: rank, condition, route.
 
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};

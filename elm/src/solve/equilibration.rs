@@ -1,4 +1,4 @@
-//! What is done to a problem before it is factorised, and how its answer is brought back.
+//! Scales a problem before it is factorised, and unscales its solution.
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip};
 

@@ -6,8 +6,9 @@
 //! (Higham, Accuracy and Stability of Numerical Algorithms, 2002, ch. 10 and 20), for half the
 //! arithmetic of QR and a small part of its memory traffic. A matrix with fewer rows than neurons
 //! is answered from $\tilde H \tilde H^T$ (the dual form):
-//! $\beta = \tilde H^T (\tilde H \tilde H^T + \lambda s_1^2 I)^{-1} \tilde T$. With at least as many rows as neurons the matrix itself is not
-//! needed: [`NormalEquations`] adds up its products tile by tile.
+//! $\beta = \tilde H^T (\tilde H \tilde H^T + \lambda s_1^2 I)^{-1} \tilde T$. With at least as
+//! many rows as neurons the matrix itself is not needed: [`NormalEquations`] adds up its products
+//! tile by tile.
 
 use ndarray::{Array1, Array2};
 

@@ -101,7 +101,7 @@ impl Tridiagonal {
         }
     }
 
-    /// Whether at least so many eigenvalues are larger than `value`: the pivots of elimination
+    /// Whether at least `wanted` eigenvalues are larger than `value`: the pivots of elimination
     /// have the signs of the eigenvalues (Sylvester's law of inertia).
     fn above(&self, value: f64, wanted: usize) -> bool {
         let mut found = 0;

@@ -331,7 +331,7 @@ impl<A: Scalar> NormalEquations<A> {
     }
 }
 
-/// Ranges of so many of more `rows`, up to a remainder, evenly spread from the first to the last.
+/// About `wanted` of `rows` rows, as runs of equal length spread evenly from first to last.
 pub(super) fn spread_runs(rows: usize, wanted: usize) -> impl Iterator<Item = Range<usize>> {
     let runs = RUNS.min(wanted);
     let length = wanted / runs;

@@ -20,8 +20,8 @@ use crate::scalar::Scalar;
 /// By QR where the matrix clearly has full rank; else by singular values, at several times the
 /// cost.
 ///
-/// Directions whose singular value is at most `cutoff` times the largest are left out. Without a
-/// cut-off of one's own only those at the level of rounding error are, which is the paper's plain
+/// Directions whose singular value is at most `cutoff` times the largest are dropped. By default
+/// only those at the level of rounding error are, which is the paper's plain
 /// pseudo-inverse: it amplifies whatever noise the smallest kept directions carry, so prefer
 /// [`Ridge`](super::Ridge) unless equation 11 itself is wanted.
 ///

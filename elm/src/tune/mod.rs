@@ -1,4 +1,4 @@
-//! Choosing the scale of the random weights, the number of neurons and the regularisation.
+//! Chooses the scale of the random weights, the number of neurons and the regularisation.
 //!
 //! What decides how good an extreme learning machine is, is the scale of its random weights: too
 //! small and every neuron is a straight line, too large and every neuron is a step. It cannot be
@@ -18,8 +18,8 @@
 //! So as not to follow noise, a step pays only if the held-out errors fall by more than one standard
 //! error of their difference, row by row: a small step of the scale by more than half of one, a large
 //! one by more than one and a half, and a scale of a single input, of which many are tried, by more
-//! than two. To scales of inputs ten standard errors are added for each input per row: on few rows of
-//! many inputs they would fit the noise.
+//! than two. Per-input scales must win by a further `10 * inputs / rows` standard errors, or they would
+//! fit noise when rows are few.
 //!
 //! An error at a scale below the one that the search begins at counts 6 % more for each decade: networks
 //! that are nearly polynomials have large output weights, which cancel among the rows and nowhere else.
@@ -113,7 +113,7 @@ pub struct Tuned<A: Scalar> {
 /// | [`criterion`](Self::criterion) | leave-one-out | the error that is made small | at least 2 folds |
 /// | [`max_neurons`](Self::max_neurons) | 1000; fewer above 4000 rows | where doubling ends when the number is not given | at least 1 |
 /// | [`search_rows`](Self::search_rows) | 2000 | rows that the search looks at, drawn at random | at least 2 |
-/// | [`per_input`](Self::per_input) | off; on for `auto` | whether each input gets a scale of its own | |
+/// | [`per_input`](Self::per_input) | off; on for `auto` | whether each input gets its own scale | |
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tuner<A: Scalar> {
     base: ElmParams<A>,
@@ -130,8 +130,8 @@ pub struct Tuner<A: Scalar> {
 }
 
 impl<A: Scalar> ElmParams<A> {
-    /// Chooses everything: neurons, weight scale, a scale per input, direct links and regularisation, for tanh
-    /// neurons with their biases on the data, within 60 factorisations.
+    /// Chooses everything: neurons, weight scale, a scale per input, direct links and
+    /// regularisation, for tanh neurons with their biases on the data, within 60 factorisations.
     #[must_use]
     pub fn auto() -> Tuner<A> {
         let base = Self::new(1)
@@ -193,7 +193,7 @@ impl<A: Scalar> Tuner<A> {
         self
     }
 
-    /// Whether each input gets a scale of its own.
+    /// Whether each input gets its own scale.
     #[must_use]
     pub fn per_input(mut self, per_input: bool) -> Self {
         self.per_input = per_input;

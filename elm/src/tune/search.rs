@@ -1,4 +1,4 @@
-//! The search itself: trials, and where to go from them.
+//! The tuner's search: fits candidates, and decides which to try next.
 
 use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
 use rand::seq::index;
@@ -38,7 +38,7 @@ struct Attempt {
 }
 
 impl Attempt {
-    /// Whether the errors are smaller by more than so many standard errors of the difference.
+    /// Whether the errors are smaller by more than `standard_errors` standard errors of the difference.
     fn improves_on(&self, other: &Self, standard_errors: f64) -> bool {
         let priced = |attempt: &Self| attempt.trial.score * attempt.price;
         if priced(self) >= priced(other) * (1.0 - MIN_GAIN) {

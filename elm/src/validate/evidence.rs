@@ -1,4 +1,4 @@
-//! How likely the targets are under a hidden layer, from the factorisation of the fit.
+//! The evidence (marginal likelihood) of a hidden layer, from the factorisation of the fit.
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,4 @@
-//! The whole of each fold's fit, from the one factorisation.
+//! Every fold's complete fit, from the one factorisation.
 
 use ndarray::{Array2, ArrayView2, Axis};
 

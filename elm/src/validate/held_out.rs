@@ -1,4 +1,4 @@
-//! What validation answers: predictions of rows not seen, and their errors along a path.
+//! Held-out predictions, and their errors along a path of strengths.
 
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 

@@ -53,7 +53,7 @@ struct Parameters {
 
 impl AnalyticModel {
     /// The shape parameters of a channel, in the order of [`Analytic::shapes`]; empty for a
-    /// channel that there is not.
+    /// channel that does not exist.
     #[must_use]
     pub fn shapes(&self, channel: usize) -> &[f64] {
         self.channels
@@ -62,7 +62,7 @@ impl AnalyticModel {
     }
 
     /// The weights of a channel's terms, in the order of [`Analytic::terms`]; empty for a channel
-    /// that there is not.
+    /// that does not exist.
     #[must_use]
     pub fn weights(&self, channel: usize) -> &[f64] {
         self.channels

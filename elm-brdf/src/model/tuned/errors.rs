@@ -1,4 +1,4 @@
-//! How errors of targets are weighed, and what noise they show.
+//! Weights of errors of targets, and the noise that they show.
 
 use ndarray::{Array1, ArrayView1, ArrayView2};
 

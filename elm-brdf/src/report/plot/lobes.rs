@@ -16,7 +16,7 @@ const LIGHTS: [(f64, RGBColor); 3] = [(22.5, BLUE), (45.0, GREEN), (67.5, VERMIL
 const NEAR: f64 = 1.5;
 /// How far from the plane of incidence its viewer may be, as the sine of the angle.
 const OFF_PLANE: f64 = 0.05;
-/// The viewer's angles of a curve: so many from horizon to horizon.
+/// Number of the viewer's angles of a curve, from horizon to horizon.
 const STEPS: usize = 181;
 
 const PANEL: (u32, u32) = (400, 236);

@@ -280,7 +280,7 @@ fn png(chart: &impl Chart) -> io::Result<Vec<u8>> {
     Ok(bytes.into_inner())
 }
 
-/// Draws two lines of text on top and returns what is left.
+/// Draws two lines of text on top and returns the remaining area.
 fn titled<DB: DrawingBackend>(
     area: &DrawingArea<DB, Shift>,
     what: &str,

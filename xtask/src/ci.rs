@@ -1,0 +1,118 @@
+//! What must hold before a commit (`check`) and before a change lands (`all`).
+
+use std::time::Instant;
+
+use crate::Result;
+use crate::package::Packaging;
+use crate::run::{command, run, say, test};
+use crate::tiers::{Tiers, has_data};
+
+/// Formatting, clippy and unit tests.
+pub(crate) fn check() -> Result {
+    run(command("cargo fmt --all --check"))?;
+    run(command(
+        "cargo clippy --workspace --all-targets --locked -- -D warnings",
+    ))?;
+    let counts = test(command("cargo test --workspace --lib --bins --locked"))?;
+    say(&format!("{} unit tests passed", counts.passed));
+    Ok(())
+}
+
+/// Runs a tool that a machine may lack, and says so if it does.
+fn run_if_installed(program: &str, line: &str) -> Result {
+    let version = command(&format!("{program} --version")).output();
+    if version.is_ok_and(|output| output.status.success()) {
+        run(command(line))
+    } else {
+        say(&format!("skipped: {program} is not installed"));
+        Ok(())
+    }
+}
+
+/// Spelling, what dependencies may be and whether all are used, combinations of features, and the
+/// oldest compiler.
+fn tools() -> Result {
+    run_if_installed("typos", "typos")?;
+    run_if_installed("cargo-deny", "cargo-deny check bans licenses sources")?;
+    run_if_installed("cargo-machete", "cargo-machete")?;
+    run(command(
+        "cargo check -p elm-learn --features rayon --locked",
+    ))?;
+    run(command(
+        "cargo check -p elm-brdf --no-default-features --features faer --locked",
+    ))?;
+    let oldest = env!("CARGO_PKG_RUST_VERSION");
+    let toolchain = format!("rustup run {oldest}.0 cargo");
+    run_if_installed(
+        &toolchain,
+        &format!("{toolchain} check -p elm-brdf --locked --target-dir target/oldest"),
+    )
+}
+
+/// Everything: all tests that can run here, documentation, both linear algebra back ends, fuzz
+/// targets, packages, and the README's first command.
+pub(crate) fn all() -> Result {
+    let start = Instant::now();
+    let step = |title: &str| say(&format!("\n== {title} ({} s)", start.elapsed().as_secs()));
+    let has_data = has_data();
+
+    step("formatting");
+    run(command("cargo fmt --all --check"))?;
+
+    step("clippy, warnings are errors");
+    run(command(
+        "cargo clippy --workspace --all-targets --locked -- -D warnings",
+    ))?;
+
+    step("tests, as the README runs them, and those that need something from outside");
+    if has_data {
+        Tiers::everything().run()?;
+    } else {
+        say("skipped: tests on real measurements");
+        Tiers::without_data().run()?;
+    }
+    // Not among the default features.
+    run(command(
+        "cargo test -p elm-brdf --features fetch --test fetch --test help --locked",
+    ))?;
+
+    step("documentation, warnings are errors");
+    let mut doc = command("cargo doc --workspace --no-deps --locked");
+    doc.env("RUSTDOCFLAGS", "-D warnings");
+    run(doc)?;
+
+    step("the OpenBLAS back end");
+    for line in [
+        "cargo clippy -p elm-learn --all-targets --no-default-features \
+         --features openblas-system --locked -- -D warnings",
+        "cargo test -p elm-learn --no-default-features --features openblas-system --locked",
+        "cargo test -p elm-tests --no-default-features --features openblas-system --locked",
+    ] {
+        run(command(line))?;
+    }
+
+    step("the fuzz targets, three seconds each");
+    run(command("fuzz/run -s 3"))?;
+
+    step("spelling, dependencies, features, the oldest compiler");
+    tools()?;
+
+    step("packages");
+    Packaging::default().run()?;
+
+    step("the README's command, on synthetic data and on real measurements where they are");
+    run(command(
+        "cargo run --release --locked -p elm-brdf -- reproduce",
+    ))?;
+    match elm_test_support::curet() {
+        Some(dir) => {
+            let mut reproduce = command("cargo run --release --locked -p elm-brdf -- reproduce");
+            reproduce.arg("--data").arg(dir);
+            run(reproduce)?;
+        }
+        None => say("skipped: the README's command on real measurements"),
+    }
+
+    step("done");
+    Ok(())
+}

@@ -1,0 +1,31 @@
+//! Packages for crates.io, in the order in which they can be published.
+
+use clap::Args;
+
+use crate::Result;
+use crate::run::{command, run};
+
+/// Every package that is published, each after those that it depends on.
+const ORDER: [&str; 4] = ["elm-datasets", "elm-learn", "elm-brdf-render", "elm-brdf"];
+
+/// How to package.
+#[derive(Args, Clone, Copy, Default)]
+pub(crate) struct Packaging {
+    /// Also with changes that are not committed.
+    #[arg(long)]
+    allow_dirty: bool,
+}
+
+impl Packaging {
+    pub(crate) fn run(self) -> Result {
+        // In one call: a package finds the others of the call, which no registry has yet.
+        let mut cargo = command("cargo package --locked");
+        for name in ORDER {
+            cargo.args(["-p", name]);
+        }
+        if self.allow_dirty {
+            cargo.arg("--allow-dirty");
+        }
+        run(cargo)
+    }
+}
