@@ -35,7 +35,7 @@ fn every_command_of_the_guide_to_materials_succeeds() {
     let dir = tempfile::tempdir().unwrap();
     for (name, rows, seed) in [("paint.csv", 200, 1), ("other.csv", 50, 2)] {
         let samples = paint::samples(rows, seed).unwrap();
-        scattered::write(&dir.path().join(name), &samples).unwrap();
+        scattered::write(dir.path().join(name), &samples).unwrap();
     }
     let scene = blocks(&text, "toml")[0];
     fs::write(dir.path().join("scene.toml"), scene).unwrap();

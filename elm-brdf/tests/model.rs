@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used)]
 
 use std::f64::consts::{FRAC_PI_2, PI};
-use std::path::{Path, PathBuf};
 
 use elm::{Activation, ElmParams, persist};
 use elm_datasets::{Invalid, MaterialId, OpenOptions, paint, synthetic};

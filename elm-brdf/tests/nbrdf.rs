@@ -5,7 +5,6 @@
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 
 use std::fs;
-use std::path::{Path, PathBuf};
 
 use elm_brdf::metrics::Metrics;
 use elm_brdf::reference::Nbrdf;
