@@ -143,9 +143,9 @@ fn networks(seed: u64) -> [Reference; 4] {
                 features: Features::Cosines,
                 link: Link::default_log(),
                 network: ElmParams::new(200)
-                    .seed(seed)
-                    .activation(Activation::Sine)
-                    .solver(Ridge::leave_one_out()),
+                    .with_seed(seed)
+                    .with_activation(Activation::Sine)
+                    .with_solver(Ridge::leave_one_out()),
             },
         ),
         tuned(TUNED, seed),
