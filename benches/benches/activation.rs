@@ -25,7 +25,7 @@ fn each<A: Scalar>(criterion: &mut Criterion) {
             let Ok(model) = network(1, NEURONS, 1, function.clone()) else {
                 return;
             };
-            let predictor = model.predictor().accuracy(accuracy);
+            let predictor = model.predictor().with_accuracy(accuracy);
             let mut scratch = predictor.scratch();
             let mut out = Array2::zeros((ROWS, 1));
             let id = BenchmarkId::new(function.name(), format!("{accuracy:?}"));

@@ -25,7 +25,7 @@ pub fn network<A: Scalar>(
     activation: Activation<A>,
 ) -> Result<Elm<A>, Error> {
     ElmParams::new(neurons)
-        .activation(activation)
-        .solver(Ridge::relative(1e-3))
+        .with_activation(activation)
+        .with_solver(Ridge::relative(1e-3))
         .fit(&rows(64, inputs), &rows(64, outputs))
 }

@@ -1,8 +1,8 @@
 //! What there is to time, by topic, over sizes: one list for the criterion benches and for the
 //! table of growth.
 
+use elm::cross_validation::{CrossValidator, assign_folds};
 use elm::solve::{LeastSquares, Ridge, Solver};
-use elm::validate::{Validator, assign_folds};
 use elm::{Accumulator, Activation, ElmParams, Error};
 use ndarray::Array2;
 use std::hint::black_box;
@@ -279,21 +279,21 @@ impl Topic {
             outputs,
         } = shape;
         let (x, t) = (rows::<f64>(count, inputs), rows::<f64>(count, outputs));
-        let params = ElmParams::new(neurons).activation(Activation::Tanh);
+        let params = ElmParams::new(neurons).with_activation(Activation::Tanh);
         Ok(match self {
             Self::HiddenLayer => {
                 let model = network::<f64>(inputs, neurons, outputs, Activation::Tanh)?;
                 Box::new(move || drop(black_box(model.hidden_matrix(&x))))
             }
             Self::Fit => {
-                let params = params.solver(Ridge::relative(1e-6)).check()?;
+                let params = params.with_solver(Ridge::relative(1e-6));
                 Box::new(move || drop(black_box(params.fit(&x, &t))))
             }
             Self::Solve => {
                 let h = network::<f64>(inputs, neurons, outputs, Activation::Tanh)?
                     .hidden_matrix(&x)?;
                 Box::new(move || {
-                    let problem = LeastSquares::new(&h, &t).map(|p| p.intercept(true));
+                    let problem = LeastSquares::new(&h, &t).map(|p| p.with_intercept(true));
                     drop(black_box(problem.and_then(|p| Solver::default().solve(&p))));
                 })
             }
@@ -302,8 +302,8 @@ impl Topic {
                     .hidden_matrix(&x)?;
                 let folds = assign_folds(count, 10, 1)?;
                 Box::new(move || {
-                    let problem = LeastSquares::new(&h, &t).map(|p| p.intercept(true));
-                    let validator = problem.and_then(|p| Validator::new(&p));
+                    let problem = LeastSquares::new(&h, &t).map(|p| p.with_intercept(true));
+                    let validator = problem.and_then(|p| CrossValidator::new(&p));
                     drop(black_box(validator.and_then(|v| v.k_fold(&folds, &[1e-6]))));
                 })
             }
@@ -317,7 +317,7 @@ impl Topic {
                 })
             }
             Self::Accumulate => {
-                let params = params.solver(Ridge::gcv()).check()?;
+                let params = params.with_solver(Ridge::gcv());
                 let empty = Accumulator::from_sample(&params, &x, outputs)?;
                 Box::new(move || {
                     let mut accumulator = empty.clone();

@@ -21,12 +21,11 @@
 
 mod design;
 
+use elm::advanced::{FeatureMap, FeatureMapParams};
+use elm::cross_validation::CrossValidator;
 use elm::persist::Persist;
 use elm::solve::{LeastSquares, Ridge, Solver};
-use elm::validate::Validator;
-use elm::{
-    Activation, Biases, Distribution, Elm, ElmParams, FeatureMap, FeatureMapParams, Neurons, Scaler,
-};
+use elm::{Activation, Biases, Distribution, Elm, ElmParams, NeuronGroup, Scaler};
 use ndarray::{Array1, Array2, ArrayView2, Axis, concatenate};
 use serde::{Deserialize, Serialize};
 
@@ -143,7 +142,7 @@ impl PriorParams {
         let map = FeatureMap::new(Some(scaler), params.draw(x.ncols())?, false)?;
         let h = map.transform(&x)?;
         let targets = Link::default_log().fit(values)?.to_targets(values)?;
-        let problem = LeastSquares::new(&h, &targets)?.intercept(true);
+        let problem = LeastSquares::new(&h, &targets)?.with_intercept(true);
         let solution = Solver::from(Ridge::relative(SMOOTHING)).solve(&problem)?;
         let mut prior = Prior {
             features: self.features,
@@ -169,20 +168,20 @@ impl PriorParams {
         let third = self.neurons / 3;
         let phase = Biases::Scaled(std::f64::consts::PI);
         let waves = |scale: f64| {
-            Neurons::new(third, Activation::Sine)
-                .scale(scale)
-                .biases(phase)
+            NeuronGroup::new(third, Activation::Sine)
+                .with_scale(scale)
+                .with_biases(phase)
         };
         let params = ElmParams::new(self.neurons - 2 * third)
-            .activation(Activation::Sine)
-            .distribution(Distribution::Normal)
-            .biases(phase)
-            .scale(1.0 / (inputs as f64).sqrt())
-            .seed(self.seed);
+            .with_activation(Activation::Sine)
+            .with_distribution(Distribution::Normal)
+            .with_biases(phase)
+            .with_scale(1.0 / (inputs as f64).sqrt())
+            .with_seed(self.seed);
         if third == 0 {
             return params;
         }
-        params.and(waves(0.3)).and(waves(3.0))
+        params.with_group(waves(0.3)).with_group(waves(3.0))
     }
 }
 
@@ -305,10 +304,10 @@ impl Prior {
                         columns: h.ncols(),
                     }
                 })?;
-            let problem = LeastSquares::new(&design, &rest)?.intercept(true);
+            let problem = LeastSquares::new(&design, &rest)?.with_intercept(true);
             if let Some(sum) = left_out.as_deref_mut() {
-                let validator = Validator::new(&problem)?;
-                let lambda = validator.strengths(Ridge::leave_one_out())?;
+                let validator = CrossValidator::new(&problem)?;
+                let lambda = validator.select_lambda(Ridge::leave_one_out())?;
                 match validator.leave_one_out(&lambda) {
                     Ok(held_out) => sum.scaled_add(share, &held_out.residuals()),
                     // One measurement: nothing can be left out of it.

@@ -1,6 +1,6 @@
 //! k-fold cross-validation of any method that fits measurements.
 
-use elm::Stream;
+use elm::advanced::Stream;
 use elm_datasets::{Material, MaterialId, Measurements, Samples};
 use ndarray::{Array2, ArrayView2, Axis, Slice, concatenate};
 use rand::seq::SliceRandom;

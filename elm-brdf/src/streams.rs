@@ -1,6 +1,6 @@
 //! The streams of random numbers of this crate; folds have [`Stream::Folds`].
 
-use elm::Stream;
+use elm::advanced::Stream;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

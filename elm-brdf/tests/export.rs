@@ -14,7 +14,9 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use elm::{Activation, Biases, ElmParams, Group, Neurons, solve::Ridge};
+use elm::advanced::NeuronBlock;
+
+use elm::{Activation, Biases, ElmParams, NeuronGroup, solve::Ridge};
 use elm_brdf::export::{ExportError, Format, Language, merl, source};
 use elm_brdf::features::Features;
 use elm_brdf::fit::Fit;
@@ -40,9 +42,9 @@ fn samples(material: usize) -> Samples {
 
 fn network(neurons: usize, activation: Activation<f64>) -> ElmParams<f64> {
     ElmParams::new(neurons)
-        .activation(activation)
-        .solver(Ridge::leave_one_out())
-        .seed(3)
+        .with_activation(activation)
+        .with_solver(Ridge::leave_one_out())
+        .with_seed(3)
 }
 
 /// A model of everything that can be exported, each with the name of its functions.
@@ -72,20 +74,20 @@ fn models() -> Vec<(String, Box<dyn Brdf>)> {
     add(
         Features::Cosines,
         log,
-        network(9, Activation::Sigmoid).direct_links(true),
+        network(9, Activation::Sigmoid).with_direct_links(true),
         1,
     );
     add(
         Features::Cosines,
         log,
-        network(9, Activation::Tanh).standardise(false),
+        network(9, Activation::Tanh).with_standardize(false),
         1,
     );
     // Several functions in one layer, of sums and of distances.
     let mixed = network(10, Activation::Tanh)
-        .and(Neurons::new(7, Activation::Sine).biases(Biases::OnData))
-        .and(Neurons::radial(9).scale(0.5))
-        .and(Neurons::radial(6).scale(0.2));
+        .with_group(NeuronGroup::new(7, Activation::Sine).with_biases(Biases::AtTrainingRows))
+        .with_group(NeuronGroup::rbf(9).with_scale(0.5))
+        .with_group(NeuronGroup::rbf(6).with_scale(0.2));
     add(Features::Highlight, log, mixed, 3);
     let samples = samples(7);
     let pairs = &samples.directions;
@@ -178,7 +180,7 @@ fn bounds(model: &BrdfModel, pairs: &[DirectionPair]) -> Vec<Option<[f64; 3]>> {
     let (inputs, neurons) = (network.inputs(), hidden.neurons());
     let beta = network.beta();
     let of_group = hidden.groups().iter();
-    let groups: Vec<&Group<f64>> = of_group
+    let groups: Vec<&NeuronBlock<f64>> = of_group
         .flat_map(|group| std::iter::repeat_n(group, group.neurons()))
         .collect();
     let factor = |i: usize| network.scaler().map_or(1.0, |s| s.factor()[i]);
@@ -611,7 +613,11 @@ fn what_cannot_be_exported_is_an_error_of_its_own() {
     ));
     let error = source(&custom, Language::C, "m").unwrap_err();
     assert_eq!(error.to_string(), "cannot export the activation 'softsign'");
-    let huge = model(network(9, Activation::Sine).scale(1e300).standardise(false));
+    let huge = model(
+        network(9, Activation::Sine)
+            .with_scale(1e300)
+            .with_standardize(false),
+    );
     let error = source(&huge, Language::C, "m").unwrap_err();
     assert!(
         matches!(error, elm_brdf::Error::Export(ExportError::Single { .. })),

@@ -162,7 +162,7 @@ fn kinds() -> Vec<BrdfModel> {
         link: Link::CubeRoot,
         network,
     };
-    let plain = ElmParams::new(20).activation(Activation::Tanh);
+    let plain = ElmParams::new(20).with_activation(Activation::Tanh);
     vec![
         Tuned::default()
             .fit_model(&pairs, values.slice(s![.., ..1]))
@@ -176,10 +176,10 @@ fn kinds() -> Vec<BrdfModel> {
         params(plain.clone())
             .fit_model(&pairs, values.view())
             .unwrap(),
-        params(plain.clone().biases(elm::Biases::OnData))
+        params(plain.clone().with_biases(elm::Biases::AtTrainingRows))
             .fit_model(&pairs, values.view())
             .unwrap(),
-        params(plain.direct_links(true))
+        params(plain.with_direct_links(true))
             .fit_model(&pairs, values.view())
             .unwrap(),
     ]

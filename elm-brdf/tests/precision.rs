@@ -24,9 +24,9 @@ fn model(lambda: f64) -> BrdfModel {
         features: Features::ReciprocalCosines,
         link: Link::default_log(),
         network: ElmParams::new(120)
-            .activation(Activation::Sine)
-            .scale(0.05)
-            .solver(Ridge::relative(lambda)),
+            .with_activation(Activation::Sine)
+            .with_scale(0.05)
+            .with_solver(Ridge::relative(lambda)),
     };
     params
         .fit_model(&samples.directions, samples.values.view())

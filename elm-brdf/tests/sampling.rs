@@ -192,8 +192,8 @@ fn every_kind() -> Vec<(String, Box<dyn Brdf>, bool)> {
             features,
             link: Link::default_log(),
             network: ElmParams::new(40)
-                .activation(Activation::Tanh)
-                .solver(Ridge::leave_one_out()),
+                .with_activation(Activation::Tanh)
+                .with_solver(Ridge::leave_one_out()),
         };
         let model = params.fit(pairs, samples.values.view()).unwrap();
         let name = format!("elm ({})", features.name());

@@ -11,7 +11,7 @@
 use std::error::Error;
 use std::process::ExitCode;
 
-use elm::{ElmParams, metrics};
+use elm::{Dataset, ElmParams, metrics};
 use elm_datasets::csv::Table;
 use ndarray::{Array2, Axis};
 
@@ -34,19 +34,20 @@ pub(crate) fn run(arguments: impl Iterator<Item = String>) -> Result<String, Box
     let (train, test, target) = parse(arguments)?;
     let table = Table::read(&train)?;
     let (x, t) = table.split_target(&[&target])?;
+    let t = t.remove_axis(Axis(1));
     let inputs: Vec<&str> = table.columns.iter().map(String::as_str).collect();
     let inputs: Vec<&str> = inputs.into_iter().filter(|name| *name != target).collect();
     let table = Table::read(&test)?;
     let (x_test, t_test) = (
         columns(&table, &test, &inputs)?,
-        columns(&table, &test, &[&target])?,
+        columns(&table, &test, &[&target])?.remove_axis(Axis(1)),
     );
 
-    let tuned = ElmParams::auto().tune(&x, &t)?;
+    let tuned = ElmParams::auto().tune(&Dataset::new(&x, &t)?)?;
     let predicted = tuned.model.predict(&x_test)?;
     let diagnosis = tuned.model.diagnosis();
     let report = serde_json::json!({
-        "test_rmse": metrics::rmse(&predicted.column(0), &t_test.column(0))?,
+        "test_rmse": metrics::rmse(&predicted, &t_test)?,
         "neurons": tuned.best.neurons,
         "scale": tuned.best.scale,
         "lambda": diagnosis.lambda.first(),

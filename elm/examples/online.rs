@@ -7,22 +7,23 @@
 use std::error::Error;
 
 use elm::solve::Ridge;
-use elm::{Activation, ElmParams, metrics};
+use elm::{Accumulator, Activation, ElmParams, metrics};
 use elm_datasets::toy;
+use ndarray::Axis;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let params = ElmParams::new(400)
-        .activation(Activation::Tanh)
-        .scale(0.05)
-        .solver(Ridge::gcv())
-        .check()?;
+        .with_activation(Activation::Tanh)
+        .with_scale(0.05)
+        .with_solver(Ridge::gcv());
     let test = toy::friedman1(5_000, 0.0, 99)?;
+    let truth = test.noiseless.remove_axis(Axis(1));
 
     // Scaling and layer are fixed by a first sample, so that every accumulator has the same.
     let sample = toy::friedman1(1_000, 1.0, 0)?;
     let (mut here, mut there) = (
-        elm::Accumulator::from_sample(&params, &sample.inputs, 1)?,
-        elm::Accumulator::from_sample(&params, &sample.inputs, 1)?,
+        Accumulator::from_sample(&params, &sample.inputs, 1)?,
+        Accumulator::from_sample(&params, &sample.inputs, 1)?,
     );
     for chunk in 1..=20 {
         let rows = toy::friedman1(1_000, 1.0, chunk)?;
@@ -31,14 +32,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         } else {
             &mut there
         };
-        target.push(&rows.inputs, &rows.targets)?;
+        target.push(&rows.inputs, &rows.targets.remove_axis(Axis(1)))?;
         if chunk % 5 == 0 {
             // What each has seen so far, put together; both go on.
             let mut both = here.clone();
             both.merge(&there)?;
             let model = both.fit()?;
             let predicted = model.predict(&test.inputs)?;
-            let rmse = metrics::rmse(&predicted.column(0), &test.noiseless.column(0))?;
+            let rmse = metrics::rmse(&predicted, &truth)?;
             println!("{:>6} rows: rmse {rmse:.3}", chunk * 1_000);
         }
     }

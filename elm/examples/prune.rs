@@ -11,9 +11,9 @@
 use std::error::Error;
 
 use elm::prune::Keep;
-use elm::{Activation, Biases, Elm, ElmParams, metrics};
+use elm::{Activation, Biases, Dataset, Elm, ElmParams, metrics};
 use elm_datasets::toy;
-use ndarray::{Array1, Array2, Axis, array};
+use ndarray::{Array1, Array2, Axis, Ix1, array};
 
 type Data = (Array2<f64>, Array1<f64>);
 
@@ -54,11 +54,11 @@ const PROBLEMS: [(&str, Draw); 5] = [
 ];
 
 fn train(toy: toy::Toy) -> Data {
-    (toy.inputs, toy.targets.column(0).to_owned())
+    (toy.inputs, toy.targets.remove_axis(Axis(1)))
 }
 
 fn test(toy: toy::Toy) -> Data {
-    (toy.inputs, toy.noiseless.column(0).to_owned())
+    (toy.inputs, toy.noiseless.remove_axis(Axis(1)))
 }
 
 fn smooth(rows: usize, seed: u64) -> Result<Data, elm_datasets::Error> {
@@ -70,8 +70,8 @@ fn smooth(rows: usize, seed: u64) -> Result<Data, elm_datasets::Error> {
     Ok((x, t))
 }
 
-fn rmse(model: &Elm<f64>, (x, t): &Data) -> Result<f64, elm::Error> {
-    metrics::rmse(&model.predict(x)?.column(0), t)
+fn rmse(model: &Elm<f64, Ix1>, (x, t): &Data) -> Result<f64, elm::Error> {
+    metrics::rmse(&model.predict(x)?, t)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -84,21 +84,22 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut within = [0.0; 3];
         for seed in 0..SEEDS {
             let ((x, t), held_out) = draw(seed)?;
+            let data = Dataset::new(&x, &t)?;
             let params = |neurons: usize| {
-                let params = ElmParams::new(neurons).activation(Activation::Tanh);
-                params.biases(Biases::OnData).seed(seed)
+                let params = ElmParams::new(neurons).with_activation(Activation::Tanh);
+                params.with_biases(Biases::AtTrainingRows).with_seed(seed)
             };
-            let wide = params(CANDIDATES).tuner().budget(12).tune(&x, &t)?;
+            let wide = params(CANDIDATES).tuner().with_budget(12).tune(&data)?;
             for (place, neurons) in [20, 40, 80].into_iter().enumerate() {
                 let random = params(neurons).tuner().fit(&x, &t)?;
-                let pruned = wide.params.fit_pruned(&x, &t, Keep::Neurons(neurons))?;
+                let pruned = wide.params.fit_pruned(&data, Keep::Neurons(neurons))?;
                 let errors = [rmse(&random, &held_out)?, rmse(&pruned.model, &held_out)?];
                 won[place] += usize::from(errors[1] < errors[0]);
                 for (log, error) in logs[place].iter_mut().zip(errors) {
                     *log += error.ln() / SEEDS as f64;
                 }
             }
-            let pruned = wide.params.fit_pruned(&x, &t, Keep::Loss(0.05))?;
+            let pruned = wide.params.fit_pruned(&data, Keep::Loss(0.05))?;
             let errors = [
                 rmse(&wide.model, &held_out)?,
                 rmse(&pruned.model, &held_out)?,

@@ -6,8 +6,8 @@
 
 use std::time::Instant;
 
+use elm::cross_validation::{CrossValidator, assign_folds};
 use elm::solve::{LeastSquares, Ridge, Solver};
-use elm::validate::{Validator, assign_folds};
 use ndarray::{Array2, Axis};
 
 fn main() -> elm::Result<()> {
@@ -22,7 +22,7 @@ fn main() -> elm::Result<()> {
                 + 0.01 * ((i * 7919 + j * 104_729) % 1009) as f64 / 1009.0
         });
         let t = Array2::from_shape_fn((rows, 3), |(i, j)| (i as f64 * 0.01 + j as f64).cos());
-        let problem = LeastSquares::new(&h, &t)?.intercept(true);
+        let problem = LeastSquares::new(&h, &t)?.with_intercept(true);
         let solve = |lambda| Solver::from(Ridge::relative(lambda)).solve(&problem);
         let slow = best_of(3, || solve(2e-8))?;
         let fast = best_of(3, || solve(3e-8))?;
@@ -32,12 +32,12 @@ fn main() -> elm::Result<()> {
             for label in 0..10 {
                 let kept: Vec<usize> = (0..rows).filter(|&row| folds[row] != label).collect();
                 let (h, t) = (h.select(Axis(0), &kept), t.select(Axis(0), &kept));
-                let problem = LeastSquares::new(&h, &t)?.intercept(true);
+                let problem = LeastSquares::new(&h, &t)?.with_intercept(true);
                 Solver::from(Ridge::relative(1e-6)).solve(&problem)?;
             }
             Ok(())
         })?;
-        let closed = best_of(3, || Validator::new(&problem)?.k_fold(&folds, &[1e-6]))?;
+        let closed = best_of(3, || CrossValidator::new(&problem)?.k_fold(&folds, &[1e-6]))?;
         lines.push(format!(
             "{rows:>7} {neurons:>7} {slow:>10.2} {fast:>10.2} {:>6.1} {refit:>14.2} {closed:>12.2} {:>6.1}",
             slow / fast,

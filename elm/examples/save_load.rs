@@ -6,29 +6,32 @@
 
 use std::error::Error;
 
-use elm::{Elm, ElmParams, persist};
+use elm::{Dataset, Elm, ElmParams, persist};
 use elm_datasets::toy;
+use ndarray::{Axis, Ix1};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let data = toy::friedman3(500, 0.1, 1)?;
-    let tuned = ElmParams::auto().tune(&data.inputs, &data.targets)?;
+    let rows = toy::friedman3(500, 0.1, 1)?;
+    let targets = rows.targets.remove_axis(Axis(1));
+    let data = Dataset::new(&rows.inputs, &targets)?;
+    let tuned = ElmParams::auto().tune(&data)?;
 
     let path = std::env::temp_dir().join("friedman3.elm");
     persist::save(&tuned.model, &path)?;
-    let model: Elm<f64> = persist::load(&path)?;
+    let model: Elm<f64, Ix1> = persist::load(&path)?;
     assert_eq!(model, tuned.model);
     println!("saved to and loaded from {}", path.display());
 
-    let uncertain = tuned.params.fit_uncertain(&data.inputs, &data.targets)?;
+    let uncertain = tuned.params.fit_uncertain(&data)?;
     let new = toy::friedman3(5, 0.1, 2)?;
     let (low, high) = uncertain.predict_interval(&new.inputs, 0.9)?;
     let predicted = model.predict(&new.inputs)?;
     for row in 0..5 {
         println!(
             "predicted {:.3}, 90 % interval {:.3} to {:.3}, observed {:.3}",
-            predicted[[row, 0]],
-            low[[row, 0]],
-            high[[row, 0]],
+            predicted[row],
+            low[row],
+            high[row],
             new.targets[[row, 0]],
         );
     }

@@ -6,32 +6,29 @@
 
 use std::error::Error;
 
-use elm::validate::assign_folds;
-use elm::{Activation, ElmParams};
+use elm::{Activation, Dataset, ElmParams};
 use elm_datasets::toy;
+use ndarray::Axis;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let data = toy::friedman1(500, 1.0, 1)?;
-    let folds = assign_folds(500, 10, 1)?;
+    let rows = toy::friedman1(500, 1.0, 1)?;
+    let targets = rows.targets.remove_axis(Axis(1));
+    let data = Dataset::new(&rows.inputs, &targets)?;
+    let folds = data.folds(10, 1)?;
     println!("activation   scale  10-fold rmse");
     for activation in [Activation::Sigmoid, Activation::Tanh, Activation::Sine] {
         for scale in [0.03, 0.1, 0.3, 1.0] {
             let params = ElmParams::new(200)
-                .activation(activation.clone())
-                .scale(scale)
-                .check()?;
-            let rmse = params
-                .cross_validate(&data.inputs, &data.targets, &folds)?
-                .rmse()[0];
+                .with_activation(activation.clone())
+                .with_scale(scale);
+            let rmse = params.cross_val_predict(&data, &folds)?.rmse();
             println!("{activation:<12} {scale:<6} {rmse:.3}");
         }
     }
 
-    let shared = ElmParams::auto()
-        .per_input(false)
-        .tune(&data.inputs, &data.targets)?;
-    let own = ElmParams::auto().tune(&data.inputs, &data.targets)?;
-    let deviation = data.targets.std_axis(ndarray::Axis(0), 0.0)[0];
+    let shared = ElmParams::auto().with_per_input(false).tune(&data)?;
+    let own = ElmParams::auto().tune(&data)?;
+    let deviation = targets.std(0.0);
     println!(
         "tuned, one scale:        {:.3}",
         shared.best.score * deviation

@@ -6,7 +6,7 @@
 
 use std::error::Error;
 
-use elm::{ElmParams, metrics};
+use elm::{Dataset, ElmParams, metrics};
 use elm_datasets::toy;
 use ndarray::{Array1, Axis};
 use plotters::prelude::*;
@@ -16,12 +16,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         .nth(1)
         .unwrap_or_else(|| "sinc.svg".to_owned());
     let train = toy::sinc(200, 0.1, 1)?;
-    let tuned = ElmParams::auto().tune(&train.inputs, &train.targets)?;
-    let model = tuned.params.fit_uncertain(&train.inputs, &train.targets)?;
+    let targets = train.targets.remove_axis(Axis(1));
+    let data = Dataset::new(&train.inputs, &targets)?;
+    let tuned = ElmParams::auto().tune(&data)?;
+    let model = tuned.params.fit_uncertain(&data)?;
 
     let test = toy::sinc(2000, 0.0, 2)?;
     let predicted = model.model().predict(&test.inputs)?;
-    let error = metrics::rmse(&predicted.column(0), &test.noiseless.column(0))?;
+    let error = metrics::rmse(&predicted, &test.noiseless.remove_axis(Axis(1)))?;
     println!(
         "{} neurons, scale {:.2}",
         tuned.best.neurons, tuned.best.scale
@@ -32,8 +34,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let inputs = x.clone().insert_axis(Axis(1));
     let y = model.model().predict(&inputs)?;
     let (low, high) = model.predict_interval(&inputs, 0.9)?;
-    let line = |values: &ndarray::Array2<f64>| -> Vec<(f64, f64)> {
-        x.iter().copied().zip(values.column(0).to_vec()).collect()
+    let line = |values: &Array1<f64>| -> Vec<(f64, f64)> {
+        x.iter().copied().zip(values.iter().copied()).collect()
     };
     let area = SVGBackend::new(&path, (800, 420)).into_drawing_area();
     area.fill(&WHITE)?;
@@ -57,7 +59,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .column(0)
         .to_vec()
         .into_iter()
-        .zip(train.targets.column(0).to_vec());
+        .zip(targets.to_vec());
     chart.draw_series(samples.map(|point| Circle::new(point, 2, BLACK.mix(0.6).filled())))?;
     area.present()?;
     println!("drawn to {path}");

@@ -7,7 +7,7 @@
 //!
 //! let x = Array2::from_shape_fn((300, 2), |(i, j)| ((i * (j + 3)) as f64 * 0.1).sin());
 //! let t = x.map_axis(ndarray::Axis(1), |row| row[0] * row[1]);
-//! let params = ElmParams::new(40).solver(Ridge::gcv()).check()?;
+//! let params = ElmParams::new(40).with_solver(Ridge::gcv());
 //!
 //! // Two workers, each with half of the rows, one of them in two pieces.
 //! let mut one = Accumulator::with_scaler(&params, Scaler::measured(&x)?, 1)?;
@@ -23,50 +23,55 @@
 //! # Ok::<(), elm::Error>(())
 //! ```
 //!
-//! What is kept of the rows is the triangle $R$ of the QR factorisation of $[1, H, T]$ (weighted),
+//! What is kept of the rows is the triangle $R$ of the QR factorization of $[1, H, T]$ (weighted),
 //! and a block of rows that have not entered it yet: memory of order (neurons + outputs)², however
-//! many rows there are. New rows are put under $R$ and the stack is factorised again; so are two
+//! many rows there are. New rows are put under $R$ and the stack is factorized again; so are two
 //! triangles that are merged (sequential and tree-shaped TSQR: Demmel, Grigori, Hoemmen and
 //! Langou, Communication-optimal parallel and sequential QR, 2012). Orthogonal transformations add
 //! errors of epsilon, not of the condition number squared as the sums of $H^T H$ that online ELMs
 //! usually keep (Liang et al., OS-ELM, 2006): chunking, order and merging change the output weights
 //! by no more than condition times epsilon.
 //!
-//! Eliminating the column of ones first centres the rest, so that $R$ without its first row is the
-//! triangle of the centred problem, and the intercept is as unpenalised as in a batch fit.
+//! Eliminating the column of ones first centers the rest, so that $R$ without its first row is the
+//! triangle of the centered problem, and the intercept is as unpenalized as in a batch fit.
 
 mod chunks;
 mod likeness;
+#[cfg(feature = "serde")]
 mod parts;
 mod shift;
 mod spectrum;
 
-use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2, Axis, s};
+use std::marker::PhantomData;
+
+use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis, Ix2, s};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::bounds::Bounds;
-use crate::check::{check_length, check_matrix, check_weights};
+use crate::check::{check_length, check_matrix};
+use crate::dataset::{Dataset, Inputs, TargetDim, Targets, check_outputs};
 use crate::error::{Error, Result};
 use crate::feature_map::{FeatureMap, HiddenLayer, Scaler};
 use crate::linalg::QrFactor;
 use crate::memory::check_room;
-use crate::model::{CheckedParams, Targets};
+use crate::model::ElmParams;
 use crate::network::Elm;
 use crate::scalar::{Scalar, power_of_two};
 use crate::solve::Solver;
 
 /// Rows in, a triangle kept; see the [module](self).
 ///
-/// The random layer and the standardisation of inputs are fixed when it is made. The solver is that
+/// The random layer and the standardization of inputs are fixed when it is made. The solver is that
 /// of the parameters, except that leave-one-out, the default, needs the rows: an accumulator
-/// chooses by generalised cross-validation in its place, so that
+/// chooses by generalized cross-validation in its place, so that
 /// [`Diagnosis::leave_one_out`](crate::solve::Diagnosis::leave_one_out) is `None`.
 ///
 /// ```
 /// use elm::{Accumulator, ElmParams};
 /// use ndarray::{Array2, Axis, array};
 ///
-/// let params = ElmParams::new(20).check()?;
+/// let params = ElmParams::new(20);
 /// // What rows look like: two inputs between -1 and 1.
 /// let sample = array![[-1.0, -1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, 1.0]];
 /// let mut accumulator = Accumulator::from_sample(&params, &sample, 1)?;
@@ -76,12 +81,13 @@ use crate::solve::Solver;
 /// }
 /// let model = accumulator.fit()?;
 /// let y = model.predict(&array![[0.25, 0.5]])?;
-/// assert!((y[[0, 0]] - 0.75_f64).abs() < 1e-3);
+/// assert!((y[0] - 0.75_f64).abs() < 1e-3);
 /// # Ok::<(), elm::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "", try_from = "parts::Parts<A>")]
-pub struct Accumulator<A: Scalar> {
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "", try_from = "parts::Parts<A>"))]
+pub struct Accumulator<A: Scalar, D: TargetDim = Ix2> {
     map: FeatureMap<A>,
     solver: Solver,
     intercept: bool,
@@ -105,24 +111,22 @@ pub struct Accumulator<A: Scalar> {
     bounded: bool,
     /// Of the rows so far whose weight is not 0.
     bounds: Option<Bounds<A>>,
+    #[cfg_attr(feature = "serde", serde(skip))]
+    dimension: PhantomData<D>,
 }
 
-impl<A: Scalar> Accumulator<A> {
-    /// Draws the random layer, with inputs standardised by `scaler`, which must be the same for
+impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
+    /// Draws the random layer, with inputs standardized by `scaler`, which must be the same for
     /// all accumulators that are to be merged.
     ///
     /// # Errors
-    /// [`Error::Conflict`] when the parameters switch standardisation off, lay biases or centres on the data
+    /// [`Error::Conflict`] when the parameters switch standardization off, lay biases or centers on the data
     /// or ask for the solver [`Inverse`](crate::solve::Inverse); [`Error::Parameter`] for 0
     /// outputs; [`Error::Shape`] for input scales; [`Error::TooLarge`].
-    pub fn with_scaler(
-        params: &CheckedParams<A>,
-        scaler: Scaler<A>,
-        outputs: usize,
-    ) -> Result<Self> {
-        if params.needs_rows() {
+    pub fn with_scaler(params: &ElmParams<A>, scaler: Scaler<A>, outputs: usize) -> Result<Self> {
+        if params.feature_map().needs_rows() {
             return Err(Error::Conflict {
-                first: "biases or centres on the data",
+                first: "biases or centers on the data",
                 second: "a layer drawn before there are rows",
             });
         }
@@ -132,21 +136,22 @@ impl<A: Scalar> Accumulator<A> {
 
     /// As [`from_sample`](Self::from_sample), with a scaler that is known beforehand.
     fn from_scaled_sample(
-        params: &CheckedParams<A>,
+        params: &ElmParams<A>,
         scaler: Scaler<A>,
         x: &ArrayRef2<A>,
         outputs: usize,
     ) -> Result<Self> {
-        if !params.standardises() {
+        params.check()?;
+        if !params.standardize() {
             return Err(Error::Conflict {
-                first: "standardise(false)",
+                first: "with_standardize(false)",
                 second: "a scaler",
             });
         }
         check_length("columns of inputs", x.ncols(), scaler.mean().len())?;
-        let map = params.params().feature_map();
+        let map = params.feature_map();
         let layer = map.draw_layer(x.view(), Some(&scaler), None)?;
-        let links = params.links_directly();
+        let links = params.direct_links();
         Self::new(
             params,
             FeatureMap::of_checked(Some(scaler), layer, links),
@@ -155,24 +160,26 @@ impl<A: Scalar> Accumulator<A> {
     }
 
     /// Draws the random layer for rows like those of `x`, shape (rows, inputs): inputs are
-    /// standardised by their means and deviations, and biases laid on them, where the parameters
+    /// standardized by their means and deviations, and biases laid on them, where the parameters
     /// say so. The rows are not pushed. One sample gives accumulators that can be merged. Rows unlike
     /// the sample are refused; see [`push`](Self::push).
     ///
     /// # Errors
     /// [`Error::Empty`] and [`Error::NotFinite`] for `x`, and those of
     /// [`with_scaler`](Self::with_scaler).
-    pub fn from_sample(
-        params: &CheckedParams<A>,
-        x: &ArrayRef2<A>,
+    pub fn from_sample<X: Inputs<A> + ?Sized>(
+        params: &ElmParams<A>,
+        x: &X,
         outputs: usize,
     ) -> Result<Self> {
-        check_matrix("inputs", x.view())?;
-        let map = params.params().feature_map();
-        Self::new(params, map.draw_weighted(x.view(), None)?, outputs)
+        params.check()?;
+        let x = x.as_matrix();
+        check_matrix("inputs", x)?;
+        let map = params.feature_map();
+        Self::new(params, map.draw_weighted(x, None)?, outputs)
     }
 
-    fn new(params: &CheckedParams<A>, map: FeatureMap<A>, outputs: usize) -> Result<Self> {
+    fn new(params: &ElmParams<A>, map: FeatureMap<A>, outputs: usize) -> Result<Self> {
         if outputs == 0 {
             return Err(Error::Parameter {
                 name: "outputs",
@@ -180,6 +187,7 @@ impl<A: Scalar> Accumulator<A> {
                 expected: "at least 1",
             });
         }
+        check_outputs::<D>(outputs)?;
         let solver = params.solver();
         if matches!(solver, Solver::Inverse(_)) {
             return Err(Error::Conflict {
@@ -188,7 +196,7 @@ impl<A: Scalar> Accumulator<A> {
             });
         }
         let inputs = map.inputs();
-        let intercept = params.has_intercept();
+        let intercept = params.intercept();
         let columns = usize::from(intercept)
             .saturating_add(map.features())
             .saturating_add(outputs);
@@ -212,8 +220,9 @@ impl<A: Scalar> Accumulator<A> {
             scales: Array1::ones(columns),
             shift: None,
             pending: Vec::new(),
-            bounded: params.is_bounded(),
+            bounded: params.bounded(),
             bounds: None,
+            dimension: PhantomData,
         })
     }
 
@@ -230,58 +239,50 @@ impl<A: Scalar> Accumulator<A> {
     /// Whether rows may be unlike those that the scaler was measured on; they may not unless this is
     /// set, and [`push`](Self::push) says so.
     #[must_use]
-    pub fn unlike_rows(mut self, allowed: bool) -> Self {
+    pub fn with_unlike_rows(mut self, allowed: bool) -> Self {
         self.unlike_rows = allowed;
         self
     }
 
-    /// Takes in rows: `x` has shape (rows, inputs), `t` (rows, outputs), or (rows) for one output.
-    /// No rows is fine.
+    /// Whether rows may be unlike those that the scaler was measured on.
+    #[must_use]
+    pub fn unlike_rows(&self) -> bool {
+        self.unlike_rows
+    }
+
+    /// Takes in rows: `x` has shape (rows, inputs), `t` (rows, outputs), or one value per row. No rows is
+    /// fine.
     ///
     /// # Errors
-    /// [`Error::Shape`] and [`Error::NotFinite`] for the data, [`Error::Overflow`] for values
+    /// Those of [`Dataset::new`] and [`push_dataset`](Self::push_dataset).
+    #[doc(alias = "partial_fit")]
+    pub fn push<X, T>(&mut self, x: &X, t: &T) -> Result<()>
+    where
+        X: Inputs<A> + ?Sized,
+        T: Targets<A, Dim = D> + ?Sized,
+    {
+        self.push_dataset(&Dataset::new(x, t)?)
+    }
+
+    /// As [`push`](Self::push), of rows that may have [weights](Dataset::with_weights), all of them 0 as
+    /// well.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] for other numbers of inputs or outputs, [`Error::Overflow`] for values
     /// beyond the range once weighted. Where the scaler does not suit the rows, which no later rows
     /// mend: [`Error::ConstantInput`] for an input that was constant where the scaler was measured
     /// and is not here, [`Error::UnlikeRows`] for one that lies more than 10 of the scaler's
     /// deviations from its mean in more than a hundredth of the rows so far and ten more (by
     /// Chebyshev's inequality no rows of that mean and deviation do). Begin again with a scaler of a
     /// [`ScalerBuilder`](crate::ScalerBuilder) that has seen more rows, or
-    /// [allow it](Self::unlike_rows). After an error nothing has been taken in.
-    pub fn push<T: Targets<A>>(&mut self, x: &ArrayRef2<A>, t: &T) -> Result<()> {
-        self.push_rows(x.view(), t.as_matrix(), None)
-    }
-
-    /// As [`push`](Self::push), with a weight for the squared residual of each row.
-    ///
-    /// # Errors
-    /// Those of [`push`](Self::push); [`Error::Shape`] and [`Error::Parameter`] for weights, of
-    /// which those of one call may all be 0.
-    pub fn push_weighted<T: Targets<A>>(
-        &mut self,
-        x: &ArrayRef2<A>,
-        t: &T,
-        weights: &ArrayRef1<A>,
-    ) -> Result<()> {
-        self.push_rows(x.view(), t.as_matrix(), Some(weights.view()))
-    }
-
-    fn push_rows(
-        &mut self,
-        x: ArrayView2<'_, A>,
-        t: ArrayView2<'_, A>,
-        weights: Option<ArrayView1<'_, A>>,
-    ) -> Result<()> {
+    /// [allow it](Self::with_unlike_rows). After an error nothing has been taken in.
+    pub fn push_dataset(&mut self, data: &Dataset<'_, A, D>) -> Result<()> {
+        let (x, t, weights) = (data.inputs(), data.target_matrix(), data.weights());
         check_length("columns of inputs", x.ncols(), self.inputs)?;
         check_length("outputs", t.ncols(), self.outputs)?;
-        check_length("rows of targets", t.nrows(), x.nrows())?;
-        if let Some(weights) = weights {
-            check_weights(weights, x.nrows())?;
-        }
         if x.nrows() == 0 {
             return Ok(());
         }
-        check_matrix("inputs", x)?;
-        check_matrix("targets", t)?;
         let bounds = Bounds::of(x, t, weights, self.bounded);
         let far = self.far_off(x, weights)?;
         let before = (self.pending.len(), self.rows, self.weighted_rows);
@@ -398,7 +399,7 @@ impl<A: Scalar> Accumulator<A> {
     ///
     /// # Errors
     /// [`Error::Empty`] without rows of positive weight, and those of [`Solver::solve`].
-    pub fn fit(&self) -> Result<Elm<A>> {
+    pub fn fit(&self) -> Result<Elm<A, D>> {
         if self.weighted_rows == 0 {
             return Err(Error::Empty {
                 what: "accumulator",
@@ -416,7 +417,7 @@ impl<A: Scalar> Accumulator<A> {
         self.triangle.ncols()
     }
 
-    /// Rows that are factorised together.
+    /// Rows that are factorized together.
     fn block(&self) -> usize {
         BLOCK * self.columns()
     }
@@ -434,7 +435,7 @@ impl<A: Scalar> Accumulator<A> {
         self.absorb(&block)
     }
 
-    /// Factorises the triangle with unscaled rows under it.
+    /// Factorizes the triangle with unscaled rows under it.
     fn absorb(&mut self, rows: &ArrayRef2<A>) -> Result<()> {
         let columns = self.columns();
         if !rows.iter().all(|v| v.is_finite()) {
@@ -464,7 +465,7 @@ impl<A: Scalar> Accumulator<A> {
             bottom.assign(&rows.column(column).mapv(|v| v / *scale));
         }
         let nothing = Array2::zeros((both.nrows(), 0));
-        let QrFactor { r, .. } = A::triangularise(both.view(), nothing.view())?;
+        let QrFactor { r, .. } = A::triangularize(both.view(), nothing.view())?;
         if !r.iter().all(|v| v.is_finite()) {
             return Err(OVERFLOW);
         }
@@ -473,8 +474,8 @@ impl<A: Scalar> Accumulator<A> {
     }
 }
 
-/// Rows in a block, in units of the triangle's size: the triangle is factorised again with every
-/// block, which costs a quarter more than one factorisation of all rows.
+/// Rows in a block, in units of the triangle's size: the triangle is factorized again with every
+/// block, which costs a quarter more than one factorization of all rows.
 const BLOCK: usize = 4;
 
 const OVERFLOW: Error = Error::Overflow {

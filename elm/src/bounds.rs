@@ -3,7 +3,7 @@
 //! A network knows nothing of inputs that it was not fitted near. Sums of hundreds of neurons whose
 //! large output weights cancel among the training rows do not cancel elsewhere, and predictions a
 //! little outside the data are easily a thousand times too large. Unless
-//! [`ElmParams::bounded`](crate::ElmParams::bounded) is switched off, a fitted network therefore
+//! [`ElmParams::with_bounded`](crate::ElmParams::with_bounded) is switched off, a fitted network therefore
 //!
 //! - takes each input that lies beyond its training range for the nearest end of that range, so that
 //!   a prediction outside is that at the edge of the data. Of inputs that are drawn alike, the next
@@ -16,6 +16,7 @@
 //! how far, and [deviations and intervals](crate::uncertainty) widen with that distance.
 
 use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis, Zip};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::check::{check_length, check_matrix};
@@ -47,8 +48,9 @@ pub const EDGE: f64 = 0.005;
 /// assert_eq!(model.predict(&array![[1e6]])?, model.predict(&array![[3.03]])?);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "", try_from = "Parts<A>")]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "", try_from = "Parts<A>"))]
 pub struct Bounds<A: Scalar> {
     inputs: Ranges<A>,
     targets: Ranges<A>,
@@ -56,14 +58,16 @@ pub struct Bounds<A: Scalar> {
 }
 
 /// The least and the greatest value of each column.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 struct Ranges<A: Scalar> {
     lower: Array1<A>,
     upper: Array1<A>,
 }
 
 /// [`Bounds`] from outside, before they are known to make sense.
+#[cfg(feature = "serde")]
 #[derive(Deserialize)]
 #[serde(bound = "")]
 struct Parts<A: Scalar> {
@@ -72,6 +76,7 @@ struct Parts<A: Scalar> {
     held: bool,
 }
 
+#[cfg(feature = "serde")]
 impl<A: Scalar> TryFrom<Parts<A>> for Bounds<A> {
     type Error = Error;
 
@@ -131,6 +136,7 @@ impl<A: Scalar> Ranges<A> {
         (of(&self.lower, &self.upper), of(&self.upper, &self.lower))
     }
 
+    #[cfg_attr(not(feature = "serde"), allow(dead_code))]
     fn check(&self, what: &'static str) -> Result<()> {
         check_length(what, self.upper.len(), self.lower.len())?;
         for ends in [&self.lower, &self.upper] {

@@ -7,6 +7,12 @@ use crate::scalar::Scalar;
 
 /// Not empty, and finite everywhere.
 pub(crate) fn check_matrix<A: Scalar>(what: &'static str, a: ArrayView2<'_, A>) -> Result<()> {
+    check_some(what, a)?;
+    check_finite(what, a)
+}
+
+/// Not empty.
+pub(crate) fn check_some<A: Scalar>(what: &'static str, a: ArrayView2<'_, A>) -> Result<()> {
     let (rows, columns) = a.dim();
     if a.is_empty() {
         return Err(Error::Empty {
@@ -15,6 +21,11 @@ pub(crate) fn check_matrix<A: Scalar>(what: &'static str, a: ArrayView2<'_, A>) 
             columns,
         });
     }
+    Ok(())
+}
+
+/// Finite everywhere.
+pub(crate) fn check_finite<A: Scalar>(what: &'static str, a: ArrayView2<'_, A>) -> Result<()> {
     // A question without places is answered several values at a time.
     if a.iter().fold(true, |all, value| all & value.is_finite()) {
         return Ok(());

@@ -92,7 +92,7 @@ pub enum Error {
         /// What differs.
         what: &'static str,
     },
-    /// An input that was constant in the rows that its standardisation was measured on is not in
+    /// An input that was constant in the rows that its standardization was measured on is not in
     /// others: it would be lost.
     #[error(
         "input {input} (counted from 0) was {constant} in all rows that the scaler was measured on \
@@ -109,7 +109,7 @@ pub enum Error {
         /// What it is.
         value: f64,
     },
-    /// Rows are not like those that the standardisation of inputs was measured on: too many of them
+    /// Rows are not like those that the standardization of inputs was measured on: too many of them
     /// lie where neurons are saturated.
     #[error(
         "input {input} (counted from 0) is more than 10 deviations from the scaler's mean in {far} \
@@ -124,10 +124,10 @@ pub enum Error {
         /// Rows so far.
         rows: u64,
     },
-    /// A factorisation did not converge.
+    /// A factorization did not converge.
     #[error("{what} did not converge")]
     NoConvergence {
-        /// Which factorisation.
+        /// Which factorization.
         what: &'static str,
     },
     /// A result lies outside the range of the floating-point type.

@@ -3,7 +3,7 @@
 //!
 //! A network with one hidden layer computes $o(x) = \sum_k \beta_k f(\omega_k \cdot x + b_k)$.
 //! An extreme learning machine draws $\omega$ and $b$ at random, never trains them, and finds the
-//! output weights $\beta$ by linear least squares. Fitting is a matrix factorisation: it takes
+//! output weights $\beta$ by linear least squares. Fitting is a matrix factorization: it takes
 //! milliseconds, has no learning rate, and has one answer.
 //!
 //! ```
@@ -14,23 +14,25 @@
 //! let t = array![0.0, 0.25, 1.0, 2.25, 4.0];
 //! let model = ElmParams::new(20).fit(&x, &t)?;
 //! let y = model.predict(&array![[1.2]])?;
-//! assert!((y[[0, 0]] - 1.44_f64).abs() < 0.1);
+//! assert!((y[0] - 1.44_f64).abs() < 0.1);
 //! # Ok::<(), elm::Error>(())
 //! ```
 //!
 //! - [`ElmParams`] holds the settings, [`Elm`] the fitted network, [`Predictor`]
 //!   its weights packed for evaluation.
-//! - [`Activation`] is the neurons' function, one of nine or your own; [`Kind`] says what it is
-//!   applied to, a weighted sum or the distance from a centre. [`Neurons`] of several kinds may
+//! - [`Activation`] is the neurons' function, one of nine or your own; [`NodeType`] says what it is
+//!   applied to, a weighted sum or the distance from a center. Several [`NeuronGroup`]s may
 //!   stand in one layer.
 //! - [`solve`] has the solvers: equations 10 and 11 of the ELM literature, and ridge regression
-//!   with its strength chosen by exact leave-one-out, which is the default.
-//! - [`validate`] has held-out predictions in closed form, leave-one-out and k-fold.
+//!   with $\lambda$ chosen by exact leave-one-out, which is the default.
+//! - [`Dataset`] is what networks are fitted to: inputs, targets, weights and groups of rows.
+//! - [`cross_validation`] has held-out predictions in closed form, leave-one-out and k-fold.
 //! - [`Accumulator`] fits to rows that arrive in pieces.
 //! - [`prune`] keeps the most useful of many neurons.
 //! - [`tune`] chooses scale, neurons and inputs; [`uncertainty`] says how far a prediction can be
 //!   trusted; [`persist`] keeps a network in a file.
-//! - [`metrics`] has RMSE, MAE and correlation.
+//! - [`metrics`] has RMSE, MAE, $R^2$ and correlation.
+//! - [`advanced`] has the parts of a network, [`ndarray`] is the version that this crate is built with.
 //!
 //! Everything is generic over [`Scalar`], `f32` or `f64`. No input makes the public API panic:
 //! what cannot be fitted or predicted is an [`Error`] that names the place.
@@ -44,13 +46,18 @@
 //! - `faer` (default): linear algebra in pure Rust.
 //! - `openblas-system`: LAPACK from the system's OpenBLAS, in place of faer. OpenBLAS is set to one
 //!   thread for the whole process: its parallel routines overflow the stack of a Rust thread.
+//! - `persist` (default): files, [`persist`].
+//! - `serde`: settings, networks and what they consist of in any format of serde; part of `persist`.
 //! - `rayon`: several threads where a call asks for them, `Predictor::predict_into_parallel` and
-//!   `CheckedParams::fit_chunks_parallel`.
+//!   `ElmParams::fit_chunks_parallel`.
 
 pub mod accumulate;
 pub mod activation;
+pub mod advanced;
 pub mod bounds;
 mod check;
+pub mod cross_validation;
+mod dataset;
 mod error;
 mod feature_map;
 mod linalg;
@@ -58,7 +65,9 @@ mod memory;
 pub mod metrics;
 mod model;
 mod network;
+#[cfg(feature = "serde")]
 mod numbers;
+#[cfg(feature = "persist")]
 pub mod persist;
 mod predictor;
 pub mod prune;
@@ -69,22 +78,19 @@ mod stats;
 mod stream;
 pub mod tune;
 pub mod uncertainty;
-pub mod validate;
 
 pub use accumulate::Accumulator;
 pub use activation::{Accuracy, Activation};
 pub use bounds::Bounds;
+pub use dataset::{Dataset, Inputs, TargetDim, Targets};
 pub use error::{Error, Result};
-pub use feature_map::{
-    Biases, Distribution, FeatureMap, FeatureMapParams, Group, HiddenLayer, Kind, Neurons, Scaler,
-    ScalerBuilder,
-};
+pub use feature_map::{Biases, Distribution, NeuronGroup, NodeType, Scaler, ScalerBuilder};
 pub use linalg::backend;
-pub use model::{CheckedParams, ElmParams, Targets};
+pub use model::ElmParams;
+pub use ndarray;
 pub use network::Elm;
 pub use predictor::{Predictor, Scratch};
 pub use scalar::Scalar;
-pub use stream::Stream;
 pub use tune::Tuner;
 pub use uncertainty::UncertainElm;
 

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 const SMALL: u64 = 1 << 26;
 
 /// Whether an array of this size can be made. Entries count as `f64`, which layers are drawn in and
-/// problems factorised in whatever they are kept in.
+/// problems factorized in whatever they are kept in.
 ///
 /// # Errors
 /// [`Error::TooLarge`].

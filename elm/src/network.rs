@@ -1,10 +1,14 @@
 //! The fitted network: a feature map and its output weights.
 
-use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis};
+use std::marker::PhantomData;
+
+use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis, Ix2};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::bounds::Bounds;
 use crate::check::{check_length, check_matrix};
+use crate::dataset::{Inputs, TargetDim, check_outputs};
 use crate::error::{Error, Result};
 use crate::feature_map::{FeatureMap, HiddenLayer, Scaler};
 use crate::memory::check_room;
@@ -16,6 +20,9 @@ use crate::solve::{Diagnosis, Reason, Solution};
 /// A fitted network: $o(x) = \sum_k \beta_k f(\omega_k \cdot x + b_k)$ (equation 7) plus, where
 /// set, an intercept and direct links. Made by [`ElmParams::fit`](crate::ElmParams::fit).
 ///
+/// `D` is the dimension of the targets and so of the predictions: `Elm<f64, Ix1>` predicts one value per
+/// row, `Elm<f64>` a matrix. A file can be loaded as either, several outputs only as the latter.
+///
 /// ```
 /// use elm::ElmParams;
 /// use ndarray::array;
@@ -24,12 +31,13 @@ use crate::solve::{Diagnosis, Reason, Solution};
 /// let model = ElmParams::new(10).fit(&x, &t)?;
 /// // A prediction is the hidden-layer matrix times the output weights, plus the intercept.
 /// let by_hand = model.hidden_matrix(&x)?.dot(&model.beta()) + &model.intercept();
-/// assert!((model.predict(&x)? - by_hand).iter().all(|d: &f64| d.abs() < 1e-9));
+/// assert!((model.predict(&x)? - by_hand.column(0)).iter().all(|d: &f64| d.abs() < 1e-9));
 /// # Ok::<(), elm::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "", try_from = "Parts<A>")]
-pub struct Elm<A: Scalar> {
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "", try_from = "Parts<A>"))]
+pub struct Elm<A: Scalar, D: TargetDim = Ix2> {
     map: FeatureMap<A>,
     /// Shape (features, outputs).
     beta: Array2<A>,
@@ -37,11 +45,13 @@ pub struct Elm<A: Scalar> {
     diagnosis: Diagnosis,
     /// Of the training rows; nothing for a network of given parts.
     bounds: Option<Bounds<A>>,
+    #[cfg_attr(feature = "serde", serde(skip))]
+    dimension: PhantomData<D>,
 }
 
 /// An [`Elm`] as it comes from outside, before its parts are known to fit together.
-#[derive(Deserialize)]
-#[serde(bound = "")]
+#[cfg_attr(feature = "serde", derive(Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 struct Parts<A: Scalar> {
     map: FeatureMap<A>,
     beta: Array2<A>,
@@ -50,19 +60,19 @@ struct Parts<A: Scalar> {
     bounds: Option<Bounds<A>>,
 }
 
-impl<A: Scalar> Elm<A> {
+impl<A: Scalar, D: TargetDim> Elm<A, D> {
     /// A network of a given feature map and output weights from elsewhere.
     ///
     /// `beta` has shape (features, outputs) and `intercept` one entry per output.
     ///
     /// ```
     /// use elm::{Elm, ElmParams};
-    /// use ndarray::array;
+    /// use ndarray::{Ix1, array};
     ///
     /// let (x, t) = (array![[0.0], [1.0], [2.0], [3.0]], array![0.0, 1.0, 4.0, 9.0]);
-    /// let params = ElmParams::new(10).seed(7);
+    /// let params = ElmParams::new(10).with_seed(7);
     /// let fitted = params.fit(&x, &t)?;
-    /// let again = Elm::from_parts(
+    /// let again: Elm<f64, Ix1> = Elm::from_parts(
     ///     params.feature_map().draw_on(&x)?,
     ///     fitted.beta().to_owned(),
     ///     fitted.intercept().to_owned(),
@@ -85,7 +95,7 @@ impl<A: Scalar> Elm<A> {
     }
 }
 
-impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
+impl<A: Scalar, D: TargetDim> TryFrom<Parts<A>> for Elm<A, D> {
     type Error = Error;
 
     fn try_from(parts: Parts<A>) -> Result<Self> {
@@ -96,6 +106,7 @@ impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
             mut diagnosis,
             bounds,
         } = parts;
+        check_outputs::<D>(beta.ncols())?;
         check_matrix("output weights", beta.view())?;
         check_length("rows of output weights", beta.nrows(), map.features())?;
         check_length("intercepts", intercept.len(), beta.ncols())?;
@@ -110,11 +121,12 @@ impl<A: Scalar> TryFrom<Parts<A>> for Elm<A> {
             intercept,
             diagnosis,
             bounds,
+            dimension: PhantomData,
         })
     }
 }
 
-impl<A: Scalar> Elm<A> {
+impl<A: Scalar, D: TargetDim> Elm<A, D> {
     pub(crate) fn assemble(
         map: FeatureMap<A>,
         solution: Solution<A>,
@@ -131,6 +143,7 @@ impl<A: Scalar> Elm<A> {
             intercept,
             diagnosis,
             bounds,
+            dimension: PhantomData,
         }
     }
 
@@ -188,7 +201,36 @@ impl<A: Scalar> Elm<A> {
             intercept,
             diagnosis,
             bounds: first.bounds.clone(),
+            dimension: PhantomData,
         }
+    }
+
+    /// The same network with predictions of another dimension: [`Ix2`](type@Ix2) for a matrix, [`Ix1`](type@ndarray::Ix1) for one
+    /// value per row.
+    ///
+    /// ```
+    /// use elm::ElmParams;
+    /// use ndarray::{Ix2, array};
+    ///
+    /// let (x, t) = (array![[0.0], [1.0], [2.0], [3.0]], array![0.0, 1.0, 4.0, 9.0]);
+    /// let model = ElmParams::new(10).fit(&x, &t)?;
+    /// assert_eq!(model.predict(&x)?.shape(), [4]);
+    /// assert_eq!(model.into_dimensionality::<Ix2>()?.predict(&x)?.shape(), [4, 1]);
+    /// # Ok::<(), elm::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Shape`] for a network of several outputs that is to predict one.
+    pub fn into_dimensionality<E: TargetDim>(self) -> Result<Elm<A, E>> {
+        check_outputs::<E>(self.outputs())?;
+        Ok(Elm {
+            map: self.map,
+            beta: self.beta,
+            intercept: self.intercept,
+            diagnosis: self.diagnosis,
+            bounds: self.bounds,
+            dimension: PhantomData,
+        })
     }
 
     /// Records residuals and leave-one-out residuals, shape (rows, outputs), in the diagnosis.
@@ -198,18 +240,19 @@ impl<A: Scalar> Elm<A> {
     }
 
     /// The hidden-layer matrix of these inputs (the paper's $F$, equation 9): shape (rows, inputs)
-    /// to (rows, neurons), followed by the standardised inputs where they are linked directly. Inputs
+    /// to (rows, neurons), followed by the standardized inputs where they are linked directly. Inputs
     /// have been held to their [`bounds`](Self::bounds).
     /// Times [`beta`](Self::beta) plus [`intercept`](Self::intercept) it is the prediction, before that
     /// is held to its own.
     ///
     /// # Errors
     /// [`Error::Shape`], [`Error::Empty`] and [`Error::NotFinite`] for `x`; [`Error::TooLarge`].
-    pub fn hidden_matrix(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
+    pub fn hidden_matrix<X: Inputs<A> + ?Sized>(&self, x: &X) -> Result<Array2<A>> {
+        let x = x.as_matrix();
         check_length("columns of inputs", x.ncols(), self.inputs())?;
-        check_matrix("inputs", x.view())?;
+        check_matrix("inputs", x)?;
         check_room("the hidden-layer matrix", x.nrows(), self.beta.nrows())?;
-        Ok(self.map.apply(self.held_inputs(x).view()))
+        Ok(self.map.apply(self.held_inputs(&x).view()))
     }
 
     /// Inputs held to their bounds.
@@ -222,7 +265,7 @@ impl<A: Scalar> Elm<A> {
     }
 
     /// The slope of each output at each row along each input, as the network makes its inputs
-    /// (standardised, where that is on): one matrix (rows, inputs) for each output.
+    /// (standardized, where that is on): one matrix (rows, inputs) for each output.
     pub(crate) fn gradients(&self, x: &ArrayRef2<A>) -> impl Iterator<Item = Array2<A>> {
         let held = self.held_inputs(x);
         let x = match self.scaler() {
@@ -241,18 +284,24 @@ impl<A: Scalar> Elm<A> {
     }
 
     /// Whether predictions are held to the [`bounds`](Self::bounds) of the training rows, where
-    /// those are known: what [`ElmParams::bounded`](crate::ElmParams::bounded) says when fitting.
+    /// those are known: what [`ElmParams::with_bounded`](crate::ElmParams::with_bounded) says when fitting.
     #[must_use]
-    pub fn bounded(mut self, bounded: bool) -> Self {
+    pub fn with_bounded(mut self, bounded: bool) -> Self {
         if let Some(bounds) = &mut self.bounds {
             bounds.hold(bounded);
         }
         self
     }
 
+    /// Whether predictions are held to the [`bounds`](Self::bounds) of the training rows.
+    #[must_use]
+    pub fn bounded(&self) -> bool {
+        self.bounds.as_ref().is_some_and(Bounds::are_held)
+    }
+
     /// How far each row, shape (rows, inputs), lies outside the box that the training rows span: 0
     /// inside, else the Euclidean distance, each input in units of its standard deviation among
-    /// the training rows (in its own units where inputs are not standardised). An input that was
+    /// the training rows (in its own units where inputs are not standardized). An input that was
     /// constant is ignored, as it is in predictions.
     ///
     /// ```
@@ -269,7 +318,8 @@ impl<A: Scalar> Elm<A> {
     /// # Errors
     /// [`Error::Shape`] and [`Error::NotFinite`] for `x`; [`Error::Conflict`] for a network
     /// [of given parts](Self::from_parts), which knows no training rows.
-    pub fn distance_outside(&self, x: &ArrayRef2<A>) -> Result<Array1<A>> {
+    pub fn distance_outside<X: Inputs<A> + ?Sized>(&self, x: &X) -> Result<Array1<A>> {
+        let x = x.as_matrix();
         let Some(bounds) = &self.bounds else {
             return Err(Error::Conflict {
                 first: "a network of given parts",
@@ -278,9 +328,9 @@ impl<A: Scalar> Elm<A> {
         };
         check_length("columns of inputs", x.ncols(), self.inputs())?;
         if x.nrows() > 0 {
-            check_matrix("inputs", x.view())?;
+            check_matrix("inputs", x)?;
         }
-        Ok(bounds.distance(x, self.scaler()))
+        Ok(bounds.distance(&x, self.scaler()))
     }
 
     /// Number of inputs.
@@ -291,6 +341,7 @@ impl<A: Scalar> Elm<A> {
 
     /// Number of outputs.
     #[must_use]
+    #[doc(alias = "n_outputs_")]
     pub fn outputs(&self) -> usize {
         self.beta.ncols()
     }
@@ -307,7 +358,7 @@ impl<A: Scalar> Elm<A> {
         self.map.layer()
     }
 
-    /// The standardisation of inputs, where it is on.
+    /// The standardization of inputs, where it is on.
     #[must_use]
     pub fn scaler(&self) -> Option<&Scaler<A>> {
         self.map.scaler()
@@ -316,12 +367,14 @@ impl<A: Scalar> Elm<A> {
     /// The output weights $\beta$, shape (neurons, outputs); with direct links the inputs' rows
     /// follow the neurons'.
     #[must_use]
+    #[doc(alias = "coef_")]
     pub fn beta(&self) -> ArrayView2<'_, A> {
         self.beta.view()
     }
 
     /// The constant added to each output.
     #[must_use]
+    #[doc(alias = "intercept_")]
     pub fn intercept(&self) -> ArrayView1<'_, A> {
         self.intercept.view()
     }

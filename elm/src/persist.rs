@@ -9,12 +9,12 @@
 //!
 //! ```
 //! use elm::{Elm, ElmParams, persist};
-//! use ndarray::array;
+//! use ndarray::{Ix1, array};
 //!
 //! let (x, t) = (array![[0.0], [1.0], [2.0], [3.0]], array![0.0, 1.0, 4.0, 9.0]);
 //! let model = ElmParams::new(10).fit(&x, &t)?;
 //! let bytes = persist::to_bytes(&model)?;
-//! let again: Elm<f64> = persist::from_bytes(&bytes)?;
+//! let again: Elm<f64, Ix1> = persist::from_bytes(&bytes)?;
 //! assert_eq!(again, model);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -35,7 +35,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::accumulate::Accumulator;
 use crate::activation::Activation;
-use crate::feature_map::{Group, HiddenLayer};
+use crate::dataset::TargetDim;
+use crate::feature_map::{HiddenLayer, NeuronBlock};
 use crate::network::Elm;
 use crate::scalar::Scalar;
 
@@ -148,7 +149,7 @@ pub trait Persist: Serialize + DeserializeOwned {
     /// The scalar type that the file names, at most 255 bytes.
     const SCALAR: &'static str;
     /// The version of this kind's layout that is written and read: one more with every change of what
-    /// is serialised.
+    /// is serialized.
     const VERSION: u32;
 
     /// Whether a file can hold all of it.
@@ -160,7 +161,7 @@ pub trait Persist: Serialize + DeserializeOwned {
     }
 }
 
-impl<A: Scalar> Persist for Elm<A> {
+impl<A: Scalar, D: TargetDim> Persist for Elm<A, D> {
     const KIND: &'static str = "elm model";
     const SCALAR: &'static str = A::NAME;
     const VERSION: u32 = 3;
@@ -170,7 +171,7 @@ impl<A: Scalar> Persist for Elm<A> {
     }
 }
 
-impl<A: Scalar> Persist for Accumulator<A> {
+impl<A: Scalar, D: TargetDim> Persist for Accumulator<A, D> {
     const KIND: &'static str = "elm accumulator";
     const SCALAR: &'static str = A::NAME;
     const VERSION: u32 = 3;
@@ -181,7 +182,7 @@ impl<A: Scalar> Persist for Accumulator<A> {
 }
 
 fn not_custom<A: Scalar>(hidden: &HiddenLayer<A>) -> Result<(), Error> {
-    let functions = hidden.groups().iter().map(Group::activation);
+    let functions = hidden.groups().iter().map(NeuronBlock::activation);
     match functions
         .into_iter()
         .find(|f| matches!(f, Activation::Custom(_)))
@@ -404,9 +405,9 @@ fn contents<T: Persist>(reason: impl std::fmt::Display) -> Error {
 
 /// What a file says, made fit for an error: one line, and not a long one.
 fn brief(text: &str) -> String {
-    const LONGEST: usize = 200;
+    const MAX_LENGTH: usize = 200;
     let printable = |c: char| if c.is_control() { ' ' } else { c };
-    let mut brief: String = text.chars().take(LONGEST).map(printable).collect();
+    let mut brief: String = text.chars().take(MAX_LENGTH).map(printable).collect();
     if brief.len() < text.len() {
         brief.push_str("...");
     }

@@ -1,21 +1,27 @@
 //! Evaluation of a fitted network, one row or millions, without allocation.
 //!
-//! A tile of rows is standardised; then, chunk of neurons by chunk, the weighted sums are taken,
+//! A tile of rows is standardized; then, chunk of neurons by chunk, the weighted sums are taken,
 //! the activation function applied, and the products with the output weights added up, while
 //! everything stays in the first-level cache. The hidden-layer matrix never exists as a whole.
 
 #[cfg(test)]
 mod tests;
 
-use ndarray::{Array2, ArrayRef2, ArrayView2, ArrayViewMut2, Axis, aview_mut1, aview1};
+use std::marker::PhantomData;
+
+use ndarray::{
+    Array, Array2, ArrayRef, ArrayRef2, ArrayView2, ArrayViewMut2, Axis, Ix2, aview_mut1, aview1,
+};
 
 use crate::activation::Accuracy;
 use crate::check::check_length;
+use crate::dataset::{Inputs, TargetDim, Targets};
 use crate::error::{Error, Result};
 use crate::feature_map::{
     Accumulate, CHUNK_PANELS, PackedMap, TILE_ROWS, TileBuffers, sum_of_line, tile_rows,
 };
 use crate::memory::check_room;
+use crate::metrics::r2;
 use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::simd::{Aligned, zeros};
@@ -48,29 +54,50 @@ use crate::simd::{Aligned, zeros};
 /// # Ok::<(), elm::Error>(())
 /// ```
 #[derive(Debug, Clone)]
-pub struct Predictor<A: Scalar> {
+pub struct Predictor<A: Scalar, D: TargetDim = Ix2> {
     map: PackedMap<A>,
     intercept: Vec<A>,
     /// What each output is held between; empty where they are not.
     output_bounds: Vec<(A, A)>,
+    dimension: PhantomData<D>,
 }
 
-impl<A: Scalar> Elm<A> {
-    /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs). Outside the
-    /// training rows predictions are held to their [`bounds`](Self::bounds).
+impl<A: Scalar, D: TargetDim> Elm<A, D> {
+    /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs), or (rows) after a fit
+    /// to one value per row. Outside the training rows predictions are held to their [`bounds`](Self::bounds).
     ///
     /// # Errors
     /// [`Error::Shape`] when the number of inputs differs from the training data's,
     /// [`Error::NotFinite`] for a NaN or infinity in `x`, [`Error::Overflow`] when a prediction is
     /// outside the range of the type. No rows is fine and gives no rows.
-    pub fn predict(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
+    pub fn predict<X: Inputs<A> + ?Sized>(&self, x: &X) -> Result<Array<A, D>> {
         self.predictor().predict(x)
+    }
+
+    /// As [`predict`](Self::predict), shape (rows, outputs) in any case.
+    pub(crate) fn predict_matrix(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
+        self.predictor().predict_matrix(x.view())
+    }
+
+    /// The coefficient of determination $R^2$ of predictions for these rows, the mean over outputs: 1 for
+    /// exact ones, 0 for none better than the mean of `t`. [`metrics`](crate::metrics) has it for each output.
+    ///
+    /// # Errors
+    /// Those of [`predict`](Self::predict) and [`metrics::r2`](crate::metrics::r2).
+    pub fn score<X, T>(&self, x: &X, t: &T) -> Result<f64>
+    where
+        X: Inputs<A> + ?Sized,
+        T: Targets<A, Dim = D> + ?Sized,
+    {
+        let predicted = self.predict_matrix(&x.as_matrix())?;
+        let each = r2(&predicted, &D::matrix_view(t.as_array()))?;
+        Ok(each.sum() / each.len() as f64)
     }
 
     /// The network packed for evaluation: for many calls, few rows at a time, threads, or
     /// memory of the caller's own.
     #[must_use]
-    pub fn predictor(&self) -> Predictor<A> {
+    pub fn predictor(&self) -> Predictor<A, D> {
         Predictor::new(self)
     }
 }
@@ -85,8 +112,8 @@ pub struct Scratch<A: Scalar> {
     sums: Aligned<A>,
 }
 
-impl<A: Scalar> Predictor<A> {
-    pub(crate) fn new(model: &Elm<A>) -> Self {
+impl<A: Scalar, D: TargetDim> Predictor<A, D> {
+    pub(crate) fn new(model: &Elm<A, D>) -> Self {
         let held = model.bounds().filter(|bounds| bounds.are_held());
         let inputs = held.map(|bounds| {
             let (lower, upper) = bounds.held_inputs();
@@ -101,14 +128,21 @@ impl<A: Scalar> Predictor<A> {
             map: PackedMap::new(model.map(), model.beta(), input_bounds),
             intercept: model.intercept().to_vec(),
             output_bounds: outputs.into_iter().flatten().collect(),
+            dimension: PhantomData,
         }
     }
 
     /// How exactly activation functions are evaluated; [`Accuracy::Full`] unless set.
     #[must_use]
-    pub fn accuracy(mut self, accuracy: Accuracy) -> Self {
+    pub fn with_accuracy(mut self, accuracy: Accuracy) -> Self {
         self.map.accuracy = accuracy;
         self
+    }
+
+    /// How exactly activation functions are evaluated.
+    #[must_use]
+    pub fn accuracy(&self) -> Accuracy {
+        self.map.accuracy
     }
 
     /// On this vector unit.
@@ -149,19 +183,24 @@ impl<A: Scalar> Predictor<A> {
         TILE_ROWS * self.outputs() * A::LINE
     }
 
-    /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs), any strides.
+    /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs), or (rows) after a fit to
+    /// one value per row; any strides.
     ///
     /// # Errors
     /// Those of [`predict_into`](Self::predict_into); [`Error::TooLarge`].
-    pub fn predict(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
+    pub fn predict<X: Inputs<A> + ?Sized>(&self, x: &X) -> Result<Array<A, D>> {
+        Ok(D::of_matrix(self.predict_matrix(x.as_matrix())?))
+    }
+
+    fn predict_matrix(&self, x: ArrayView2<'_, A>) -> Result<Array2<A>> {
         check_length("columns of inputs", x.ncols(), self.inputs())?;
         check_room("the predictions", x.nrows(), self.outputs())?;
         let mut out = Array2::zeros((x.nrows(), self.outputs()));
-        self.predict_into(x, &mut out, &mut self.scratch())?;
+        self.tiles(x, out.view_mut(), 0, &mut self.scratch())?;
         Ok(out)
     }
 
-    /// As [`predict`](Self::predict) into `out`, shape (rows, outputs), without allocating.
+    /// As [`predict`](Self::predict) into `out`, without allocating.
     ///
     /// # Errors
     /// [`Error::Shape`] when `x`, `out` or `scratch` have the wrong size, [`Error::NotFinite`] for
@@ -170,17 +209,26 @@ impl<A: Scalar> Predictor<A> {
     pub fn predict_into(
         &self,
         x: &ArrayRef2<A>,
-        out: &mut ArrayRef2<A>,
+        out: &mut ArrayRef<A, D>,
         scratch: &mut Scratch<A>,
     ) -> Result<()> {
-        self.check(x, out)?;
+        self.predict_into_matrix(x, D::matrix_view_mut(out.view_mut()), scratch)
+    }
+
+    fn predict_into_matrix(
+        &self,
+        x: &ArrayRef2<A>,
+        out: ArrayViewMut2<'_, A>,
+        scratch: &mut Scratch<A>,
+    ) -> Result<()> {
+        self.check(x, &out)?;
         let found = scratch.tile.lengths().into_iter();
         let found = found.chain([scratch.sums.as_slice().len()]);
         let expected = self.map.lengths().into_iter().chain([self.sums_length()]);
         for (found, expected) in found.zip(expected) {
             check_length("scratch", found, expected)?;
         }
-        self.tiles(x.view(), out.view_mut(), 0, scratch)
+        self.tiles(x.view(), out, 0, scratch)
     }
 
     /// As [`predict_into`](Self::predict_into) for a single row: `x` has the inputs, `out`
@@ -190,8 +238,8 @@ impl<A: Scalar> Predictor<A> {
     /// Those of [`predict_into`](Self::predict_into).
     pub fn predict_row(&self, x: &[A], out: &mut [A], scratch: &mut Scratch<A>) -> Result<()> {
         let x = aview1(x).insert_axis(Axis(0));
-        let mut out = aview_mut1(out).insert_axis(Axis(0));
-        self.predict_into(&x, &mut out, scratch)
+        let out = aview_mut1(out).insert_axis(Axis(0));
+        self.predict_into_matrix(&x, out, scratch)
     }
 
     /// As [`predict_into`](Self::predict_into) on the threads of rayon's current pool, each with
@@ -200,12 +248,13 @@ impl<A: Scalar> Predictor<A> {
     /// # Errors
     /// Those of [`predict_into`](Self::predict_into); of several rows at fault, any may be named.
     #[cfg(feature = "rayon")]
-    pub fn predict_into_parallel(&self, x: &ArrayRef2<A>, out: &mut ArrayRef2<A>) -> Result<()> {
+    pub fn predict_into_parallel(&self, x: &ArrayRef2<A>, out: &mut ArrayRef<A, D>) -> Result<()> {
         use ndarray::parallel::prelude::*;
 
         // Enough work to outweigh handing it over.
         const TASK_ROWS: usize = 32 * TILE_ROWS;
-        self.check(x, out)?;
+        let mut out = D::matrix_view_mut(out.view_mut());
+        self.check(x, &out)?;
         if x.nrows() == 0 {
             return Ok(());
         }
@@ -219,7 +268,7 @@ impl<A: Scalar> Predictor<A> {
             )
     }
 
-    fn check(&self, x: &ArrayRef2<A>, out: &ArrayRef2<A>) -> Result<()> {
+    fn check(&self, x: &ArrayRef2<A>, out: &ArrayViewMut2<'_, A>) -> Result<()> {
         check_length("columns of inputs", x.ncols(), self.inputs())?;
         check_length("rows of predictions", out.nrows(), x.nrows())?;
         check_length("columns of predictions", out.ncols(), self.outputs())

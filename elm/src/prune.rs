@@ -8,17 +8,18 @@
 //!
 //! ```
 //! use elm::prune::Keep;
-//! use elm::{Activation, ElmParams};
+//! use elm::{Activation, Dataset, ElmParams};
 //! use ndarray::{Array1, Axis};
 //!
 //! let x = Array1::linspace(-3.0, 3.0, 200).insert_axis(Axis(1));
 //! let t = x.mapv(|x: f64| (2.0 * x).sin() * x);
-//! let params = ElmParams::new(80).activation(Activation::Tanh);
-//! let ten = params.fit_pruned(&x, &t, Keep::Neurons(10))?.model;
+//! let data = Dataset::new(&x, &t)?;
+//! let params = ElmParams::new(80).with_activation(Activation::Tanh);
+//! let ten = params.fit_pruned(&data, Keep::Neurons(10))?.model;
 //! assert_eq!(ten.hidden().neurons(), 10);
 //!
 //! // As few as leave-one-out says will do.
-//! let pruned = params.fit_pruned(&x, &t, Keep::Loss(0.1))?;
+//! let pruned = params.fit_pruned(&data, Keep::Loss(0.1))?;
 //! println!("{} of 80 neurons", pruned.kept.len());
 //! # assert!(pruned.kept.len() < 80);
 //! # Ok::<(), elm::Error>(())
@@ -26,11 +27,11 @@
 //!
 //! # How
 //! Backward elimination under ridge of one strength $\lambda$: the solver's, or where that chooses
-//! its own the one that generalised cross-validation chooses for all candidates. With
+//! its own the one that generalized cross-validation chooses for all candidates. With
 //! $A = (\tilde H^T \tilde H + \lambda)^{-1}$ striking out neuron $k$ and fitting the others again
 //! costs
 //! $$\frac{\beta_k^2}{A_{kk}}$$
-//! of the penalised sum of squares (of several outputs, the sum of these relative to the outputs'
+//! of the penalized sum of squares (of several outputs, the sum of these relative to the outputs'
 //! variances), exactly; the neuron that costs least goes, $A$ and $\beta$ are brought down by one
 //! (Hassibi and Stork's optimal brain surgeon, 1993, which for a linear readout is exact), and so
 //! on. That gives an order, and each beginning of it is a network. In that order one triangle $R$
@@ -39,7 +40,7 @@
 //! over the rows has the exact leave-one-out error of **every** size. The smallest that keeps to the
 //! stated loss is taken, and fitted by the parameters' own solver.
 //!
-//! Everything comes from orthogonal factorisations, never from $\tilde H^T \tilde H$; $A$ is computed
+//! Everything comes from orthogonal factorizations, never from $\tilde H^T \tilde H$; $A$ is computed
 //! anew, from the triangle of what is left, each time a quarter of the neurons has gone, and
 //! $\lambda$ is at least 1e-15 of the largest squared singular value for it.
 //!
@@ -58,47 +59,51 @@
 
 mod fit;
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, concatenate, s};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Ix2, concatenate, s};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
+use crate::dataset::TargetDim;
 use crate::error::{Error, Result};
 use crate::linalg::{Backend, QrFactor};
 use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::solve::design_svd::DesignSvd;
-use crate::solve::equilibration::{Equilibration, Prepared};
+use crate::solve::equilibration::{EquilibratedProblem, Equilibration};
 use crate::solve::lanczos::largest_eigenvalue;
 use crate::solve::symmetric::Symmetric;
 use crate::solve::{Lambda, LeastSquares, Ridge};
 
 /// How much of a layer stays.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum Keep {
     /// Exactly this number of neurons.
     Neurons(usize),
     /// As few neurons as keep the leave-one-out RMSE within 1 plus this times that of all: 0.05 for
     /// a loss of 5 %. Of several outputs, the root mean square of their RMSEs, each relative to the
     /// output's standard deviation.
-    Loss(#[serde(serialize_with = "crate::numbers::finite")] f64),
+    Loss(#[cfg_attr(feature = "serde", serde(serialize_with = "crate::numbers::finite"))] f64),
 }
 
 /// A size of network, and how good it is by leave-one-out at the strength that ranked the neurons.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Size {
     /// Number of neurons.
     pub neurons: usize,
     /// Leave-one-out RMSE relative to the targets' standard deviation, root mean square over
     /// outputs; infinite where a row determines its own fit.
-    #[serde(with = "crate::numbers::score")]
+    #[cfg_attr(feature = "serde", serde(with = "crate::numbers::score"))]
     pub score: f64,
 }
 
 /// A pruned network; made by [`ElmParams::fit_pruned`](crate::ElmParams::fit_pruned).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Pruned<A: Scalar> {
+pub struct Pruned<A: Scalar, D: TargetDim = Ix2> {
     /// The network of the neurons that are kept.
-    pub model: Elm<A>,
+    pub model: Elm<A, D>,
     /// Which of the neurons drawn they are, rising.
     pub kept: Vec<usize>,
     /// The sizes that were looked at, the smallest first: from 1 to all for [`Keep::Loss`], the one
@@ -141,7 +146,7 @@ fn choose(
     ridge: Ridge,
     keep: Keep,
 ) -> Result<(Vec<usize>, Vec<Size>)> {
-    let prepared = Prepared::new(problem);
+    let prepared = EquilibratedProblem::new(problem);
     let root = Root::new(&prepared, ridge)?;
     let least = match keep {
         Keep::Neurons(kept) => kept,
@@ -208,8 +213,8 @@ struct Root {
 }
 
 impl Root {
-    fn new(prepared: &Prepared<f64>, ridge: Ridge) -> Result<Self> {
-        let Prepared {
+    fn new(prepared: &EquilibratedProblem<f64>, ridge: Ridge) -> Result<Self> {
+        let EquilibratedProblem {
             hidden,
             targets,
             frame,
@@ -219,7 +224,7 @@ impl Root {
                 r,
                 qtb,
                 residual_ss,
-            } = f64::triangularise(hidden.view(), targets.view())?;
+            } = f64::triangularize(hidden.view(), targets.view())?;
             (r, qtb, residual_ss)
         } else {
             let none = Array1::zeros(targets.ncols());
@@ -238,7 +243,9 @@ impl Root {
                 residual_ss,
             };
             let spectrum = DesignSvd::of_triangle(triangle, frame.clone())?;
-            let relative = ridge.shared(true).strengths_without_rows(&spectrum);
+            let relative = ridge
+                .with_shared(true)
+                .select_lambda_without_rows(&spectrum);
             let relative = relative.first().copied().unwrap_or(FLOOR);
             spectrum.s.first().map(|s| (relative, s * s))
         };
@@ -265,7 +272,7 @@ impl Root {
         };
         let hidden = stack(hidden.view(), ridge.view())?;
         let targets = stack(self.targets.view(), nothing.view())?;
-        Ok(f64::triangularise(hidden.view(), targets.view())?)
+        Ok(f64::triangularize(hidden.view(), targets.view())?)
     }
 }
 
@@ -348,7 +355,7 @@ impl<'a> Elimination<'a> {
 /// The leave-one-out score of the networks of the first columns in this order, from `first` columns
 /// on.
 fn leave_one_out_scores(
-    prepared: &Prepared<f64>,
+    prepared: &EquilibratedProblem<f64>,
     root: &Root,
     order: &[usize],
     first: usize,
@@ -357,7 +364,7 @@ fn leave_one_out_scores(
     const RESOLVED: f64 = 1e-8;
     // Rows whose coordinates stay in the cache.
     const BLOCK: usize = 256;
-    let Prepared {
+    let EquilibratedProblem {
         hidden,
         targets,
         frame,

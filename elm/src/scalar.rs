@@ -3,14 +3,10 @@
 use std::iter::Sum;
 
 use ndarray::{ArrayView, CowArray, Dimension, NdFloat};
-use serde::{Serialize, de::DeserializeOwned};
-
-use crate::linalg::Backend;
-use crate::simd::Coefficients;
 
 /// `f32` or `f64`. Sealed: the linear algebra and the vector code behind it exist for these
 /// two.
-pub trait Scalar: NdFloat + Backend + Coefficients + Sum + Serialize + DeserializeOwned {
+pub trait Scalar: NdFloat + Sum + sealed::Sealed {
     /// The type's name, `"f32"` or `"f64"`.
     const NAME: &'static str;
 
@@ -22,6 +18,27 @@ pub trait Scalar: NdFloat + Backend + Coefficients + Sum + Serialize + Deseriali
 
     /// These values as `f64`: a copy of `f32`, the array itself of `f64`.
     fn widen<D: Dimension>(values: ArrayView<'_, Self, D>) -> CowArray<'_, f64, D>;
+}
+
+mod sealed {
+    use crate::linalg::Backend;
+    use crate::simd::Coefficients;
+
+    /// What the library itself asks of a scalar.
+    pub trait Sealed: Backend + Coefficients + Stored {}
+
+    impl Sealed for f32 {}
+    impl Sealed for f64 {}
+
+    #[cfg(feature = "serde")]
+    pub trait Stored: serde::Serialize + serde::de::DeserializeOwned {}
+    #[cfg(feature = "serde")]
+    impl<T: serde::Serialize + serde::de::DeserializeOwned> Stored for T {}
+
+    #[cfg(not(feature = "serde"))]
+    pub trait Stored {}
+    #[cfg(not(feature = "serde"))]
+    impl<T> Stored for T {}
 }
 
 impl Scalar for f32 {

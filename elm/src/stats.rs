@@ -17,12 +17,14 @@
 mod tests;
 
 use ndarray::{ArrayView1, ArrayView2};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::scalar::{Scalar, power_of_two};
 
 /// A compensated sum.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub(crate) struct Sum {
     high: f64,
     /// What rounding took from `high`.
@@ -49,6 +51,7 @@ impl Sum {
         }
     }
 
+    #[cfg(any(feature = "serde", test))]
     fn is_finite(self) -> bool {
         self.high.is_finite() && self.low.is_finite()
     }
@@ -103,7 +106,8 @@ pub(crate) fn means<A: Scalar, W: Scalar>(
 }
 
 /// What is known of one column: enough for its mean and deviation, and to go on from there.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub(crate) struct Column {
     least: f64,
     most: f64,
@@ -200,6 +204,7 @@ impl Column {
         };
     }
 
+    #[cfg(any(feature = "serde", test))]
     fn is_sound(&self) -> bool {
         let finite = [self.least, self.most, self.unit, self.mean, self.mean_low];
         finite.iter().all(|value| value.is_finite())
@@ -211,7 +216,8 @@ impl Column {
 
 /// Means and deviations of columns over rows that may come block by block. Rows of weight 0 are no
 /// rows.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub(crate) struct Moments {
     /// Rows of positive weight.
     rows: u64,
@@ -349,6 +355,7 @@ impl Moments {
     }
 
     /// Whether moments from outside can be those of some rows.
+    #[cfg(any(feature = "serde", test))]
     pub(crate) fn is_sound(&self) -> bool {
         let empty = self.rows == 0;
         let weight = self.weight.value();

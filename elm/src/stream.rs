@@ -1,7 +1,7 @@
 //! The streams of random numbers that a seed has, so that no two uses share one.
 //!
 //! ```
-//! use elm::Stream;
+//! use elm::advanced::Stream;
 //!
 //! let all = [Stream::Weights(0), Stream::Rows(0), Stream::Weights(1), Stream::Rows(1)];
 //! let others = [Stream::Folds, Stream::SearchRows, Stream::Application(0), Stream::Application(1)];
@@ -18,7 +18,7 @@ use rand_chacha::ChaCha8Rng;
 pub enum Stream {
     /// Weights and biases of a group of neurons, by its index in the layer.
     Weights(u32),
-    /// Training rows that biases or centres of a group of neurons lie on.
+    /// Training rows that biases or centers of a group of neurons lie on.
     Rows(u32),
     /// Folds of a cross-validation.
     Folds,

@@ -1,11 +1,11 @@
 //! Standard deviations and intervals of predictions.
 //!
-//! Two answers, from the factorisation that found the output weights:
+//! Two answers, from the factorization that found the output weights:
 //!
 //! - [`UncertainElm::predict_deviation`]: the standard deviation of a new observation under the
 //!   ridge posterior. With $\beta \sim N(0, \sigma^2 / \lambda)$ and noise $\sigma$ the variance at
 //!   $x$ is $\sigma^2 (1 + 1/n + \tilde h(x)^T (\tilde H^T \tilde H + \lambda)^{-1} \tilde h(x))$,
-//!   columns centred for the intercept (without one the $1/n$ goes too). $\sigma^2$ is estimated by
+//!   columns centered for the intercept (without one the $1/n$ goes too). $\sigma^2$ is estimated by
 //!   the mean of residual times leave-one-out residual, which counts each squared residual by the
 //!   freedom that its row kept. Cheap and smooth, right where noise is normal and even.
 //! - [`UncertainElm::predict_interval`]: the jackknife+ of Barber, Candès, Ramdas and Tibshirani
@@ -13,7 +13,7 @@
 //!   the $n$ networks that each leave out one row, all in closed form. Assumes nothing of the noise
 //!   but that rows are exchangeable: of settings that were not chosen on the rows, an interval asked to
 //!   cover $1 - \alpha$ covers at least $1 - 2\alpha$, and about $1 - \alpha$ in practice. Residuals are
-//!   studentised: the one of row $i$ counts relative to the deviation above, at that row by the fit without
+//!   studentized: the one of row $i$ counts relative to the deviation above, at that row by the fit without
 //!   it, and is scaled by the deviation of that fit at $x$. Intervals are therefore wider where the training
 //!   rows say little. The guarantee holds for any such scale that treats all rows alike.
 //!
@@ -24,35 +24,36 @@
 //! $r = (\sum_j g_j^2 e_j^2)^{1/2}$ as one more independent deviation, and $6r$ at either end of an
 //! interval. This assumes that the function is no steeper outside than inside; it is no guarantee.
 //!
-//! Both take the random layer, its standardisation and $\lambda$ as given. Where these were chosen on
+//! Both take the random layer, its standardization and $\lambda$ as given. Where these were chosen on
 //! the same rows, as $\lambda$ is by default and everything by [`ElmParams::auto`], nothing is
 //! guaranteed: errors are larger than either says, a little with many rows, and by a half with ten. There
 //! 90 % intervals cover 0.8 or more after a choice of $\lambda$ alone and about 0.75 after `auto`.
 //!
 //! ```
-//! use elm::ElmParams;
+//! use elm::{Dataset, ElmParams};
 //! use ndarray::{Array1, Axis, array};
 //!
 //! let x = Array1::linspace(-3.0, 3.0, 80).insert_axis(Axis(1));
-//! let t = x.mapv(|x: f64| x.sin() + 0.05 * (37.0 * x).sin());
-//! let model = ElmParams::new(20).fit_uncertain(&x, &t)?;
+//! let t = x.column(0).mapv(|x: f64| x.sin() + 0.05 * (37.0 * x).sin());
+//! let model = ElmParams::new(20).fit_uncertain(&Dataset::new(&x, &t)?)?;
 //! let deviation = model.predict_deviation(&array![[0.0], [30.0]])?;
-//! assert!(deviation[[0, 0]] < 0.1 && deviation[[1, 0]] > deviation[[0, 0]]);
+//! assert!(deviation[0] < 0.1 && deviation[1] > deviation[0]);
 //! let (low, high) = model.predict_interval(&array![[0.0]], 0.9)?;
-//! assert!(low[[0, 0]] < 0.0 && high[[0, 0]] > 0.0);
+//! assert!(low[0] < 0.0 && high[0] > 0.0);
 //! # Ok::<(), elm::Error>(())
 //! ```
 
-use ndarray::{Array1, Array2, ArrayRef2, ArrayView2, Axis, Zip, s};
+use ndarray::{Array, Array1, Array2, ArrayRef2, Axis, Ix2, Zip, s};
 
+use crate::cross_validation::CrossValidator;
+use crate::dataset::{Dataset, Inputs, TargetDim, per_output};
 use crate::error::{Error, Result};
 use crate::metrics::root_mean_squares;
-use crate::model::{CheckedParams, ElmParams, Targets};
+use crate::model::ElmParams;
 use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::solve::Solver;
 use crate::stats;
-use crate::validate::Validator;
 
 /// A fitted network that knows how far off it may be; made by [`ElmParams::fit_uncertain`] and
 /// [`ElmParams::fit_ensemble`].
@@ -60,24 +61,24 @@ use crate::validate::Validator;
 /// Keeps one number per training row and neuron beside the network.
 ///
 /// ```
-/// use elm::ElmParams;
+/// use elm::{Dataset, ElmParams};
 /// use ndarray::{Array1, Axis, array};
 ///
 /// let x = Array1::linspace(-3.0, 3.0, 80).insert_axis(Axis(1));
-/// let t = x.mapv(|x: f64| x.sin() + 0.1 * (37.0 * x).sin());
-/// let model = ElmParams::new(20).fit_uncertain(&x, &t)?;
+/// let t = x.column(0).mapv(|x: f64| x.sin() + 0.1 * (37.0 * x).sin());
+/// let model = ElmParams::new(20).fit_uncertain(&Dataset::new(&x, &t)?)?;
 /// // The noise is a sine of amplitude 0.1, of standard deviation 0.07.
-/// assert!((0.05..0.1).contains(&model.noise()[0]));
+/// assert!((0.05..0.1).contains(&model.noise()));
 /// let y = model.model().predict(&array![[1.0]])?;
 /// let (low, high) = model.predict_interval(&array![[1.0]], 0.8)?;
-/// assert!(low[[0, 0]] < y[[0, 0]] && y[[0, 0]] < high[[0, 0]]);
+/// assert!(low[0] < y[0] && y[0] < high[0]);
 /// # Ok::<(), elm::Error>(())
 /// ```
 #[derive(Debug, Clone)]
-pub struct UncertainElm<A: Scalar> {
+pub struct UncertainElm<A: Scalar, D: TargetDim = Ix2> {
     /// The mean of the members, the member itself where there is one.
-    model: Elm<A>,
-    members: Vec<Member<A>>,
+    model: Elm<A, D>,
+    members: Vec<Member<A, D>>,
     /// Leave-one-out residuals of the mean, shape (rows, outputs).
     left_out: Array2<A>,
     /// Their sizes over the deviation of a new observation there, in units of the noise, by the fit
@@ -92,16 +93,16 @@ pub struct UncertainElm<A: Scalar> {
 
 /// One of the networks whose mean is predicted.
 #[derive(Debug, Clone)]
-struct Member<A: Scalar> {
-    model: Elm<A>,
-    validator: Validator<A>,
+struct Member<A: Scalar, D: TargetDim> {
+    model: Elm<A, D>,
+    validator: CrossValidator<A>,
     /// Leave-one-out residuals, shape (rows, outputs).
     left_out: Array2<A>,
     /// One minus the leverage of each row, shape (rows, outputs).
     freedom: Array2<A>,
 }
 
-impl<A: Scalar> Member<A> {
+impl<A: Scalar, D: TargetDim> Member<A, D> {
     /// What the posterior adds to the variance of a new observation, in units of the noise's, shape
     /// (rows, outputs); `hidden` is this member's hidden-layer matrix.
     fn spread(&self, hidden: &Array2<A>) -> Array2<A> {
@@ -111,38 +112,17 @@ impl<A: Scalar> Member<A> {
 }
 
 impl<A: Scalar> ElmParams<A> {
-    /// Fits the mean of this many networks, which differ in their seeds alone: the parameters' seed
-    /// and those that follow it. See [`CheckedParams::fit_ensemble`].
+    /// Fits, and keeps what [`uncertainty`](crate::uncertainty) needs. Factorizes twice.
     ///
     /// # Errors
-    /// Those of [`check`](Self::check) and [`CheckedParams::fit_ensemble`].
-    pub fn fit_ensemble<T: Targets<A>>(
+    /// Those of [`fit_dataset`](Self::fit_dataset); [`Error::Conflict`] unless the solver is ridge, and for
+    /// rows with weights; [`Error::Undetermined`] when a row cannot be left out, as of a single one.
+    pub fn fit_uncertain<D: TargetDim>(
         &self,
-        members: usize,
-        x: &ArrayRef2<A>,
-        t: &T,
-    ) -> Result<UncertainElm<A>> {
-        self.clone().check()?.fit_ensemble(members, x, t)
-    }
-
-    /// Fits, and keeps what [`uncertainty`](crate::uncertainty) needs.
-    ///
-    /// # Errors
-    /// Those of [`check`](Self::check) and [`CheckedParams::fit_uncertain`].
-    pub fn fit_uncertain<T: Targets<A>>(&self, x: &ArrayRef2<A>, t: &T) -> Result<UncertainElm<A>> {
-        self.clone().check()?.fit_uncertain(x, t)
-    }
-}
-
-impl<A: Scalar> CheckedParams<A> {
-    /// Fits, and keeps what [`uncertainty`](crate::uncertainty) needs. Factorises twice.
-    ///
-    /// # Errors
-    /// Those of [`fit`](Self::fit); [`Error::Conflict`] unless the solver is ridge;
-    /// [`Error::Undetermined`] when a row cannot be left out, as of a single one.
-    pub fn fit_uncertain<T: Targets<A>>(&self, x: &ArrayRef2<A>, t: &T) -> Result<UncertainElm<A>> {
-        let member = self.fit_member(x, t)?;
-        UncertainElm::new(vec![member], x, t.as_matrix())
+        data: &Dataset<'_, A, D>,
+    ) -> Result<UncertainElm<A, D>> {
+        let member = self.fit_member(data)?;
+        UncertainElm::new(vec![member], data)
     }
 
     /// Fits the mean of this many networks, which differ in their seeds alone: the parameters' seed
@@ -154,17 +134,17 @@ impl<A: Scalar> CheckedParams<A> {
     /// of theirs, exactly; its
     /// [`Diagnosis`](crate::solve::Diagnosis) has their RMSE, the mean of the members' effective
     /// degrees of freedom (which is that of the mean) and the geometric mean of their
-    /// $\lambda$. Factorises twice for each member.
+    /// $\lambda$. Factorizes twice for each member.
     ///
     /// ```
-    /// use elm::ElmParams;
+    /// use elm::{Dataset, ElmParams};
     /// use ndarray::{Array1, Axis};
     ///
     /// let x = Array1::linspace(-3.0, 3.0, 80).insert_axis(Axis(1));
-    /// let t = x.mapv(|x: f64| x.sin() + 0.05 * (37.0 * x).sin());
-    /// let five = ElmParams::new(20).fit_ensemble(5, &x, &t)?;
+    /// let t = x.column(0).mapv(|x: f64| x.sin() + 0.05 * (37.0 * x).sin());
+    /// let five = ElmParams::new(20).fit_ensemble(5, &Dataset::new(&x, &t)?)?;
     /// assert_eq!(five.model().hidden().neurons(), 100);
-    /// let mean = five.leave_one_out()[0];
+    /// let mean = five.leave_one_out();
     /// let alone = five.members_leave_one_out().column(0).sum() / 5.0;
     /// assert!(mean <= alone); // always: the mean of squares is at least the square of the mean
     /// # Ok::<(), elm::Error>(())
@@ -172,12 +152,11 @@ impl<A: Scalar> CheckedParams<A> {
     ///
     /// # Errors
     /// [`Error::Parameter`] for 0 members; those of [`fit_uncertain`](Self::fit_uncertain).
-    pub fn fit_ensemble<T: Targets<A>>(
+    pub fn fit_ensemble<D: TargetDim>(
         &self,
         members: usize,
-        x: &ArrayRef2<A>,
-        t: &T,
-    ) -> Result<UncertainElm<A>> {
+        data: &Dataset<'_, A, D>,
+    ) -> Result<UncertainElm<A, D>> {
         if members == 0 {
             return Err(Error::Parameter {
                 name: "members",
@@ -186,23 +165,30 @@ impl<A: Scalar> CheckedParams<A> {
             });
         }
         let member = |number| {
-            let seed = self.params().get_seed().wrapping_add(number);
-            self.params().clone().seed(seed).check()?.fit_member(x, t)
+            let seed = self.seed().wrapping_add(number);
+            self.clone().with_seed(seed).fit_member(data)
         };
         let members = (0..members as u64).map(member).collect::<Result<_>>()?;
-        UncertainElm::new(members, x, t.as_matrix())
+        UncertainElm::new(members, data)
     }
 
-    fn fit_member<T: Targets<A>>(&self, x: &ArrayRef2<A>, t: &T) -> Result<Member<A>> {
+    fn fit_member<D: TargetDim>(&self, data: &Dataset<'_, A, D>) -> Result<Member<A, D>> {
+        if data.weights().is_some() {
+            return Err(Error::Conflict {
+                first: "row weights",
+                second: "uncertainty",
+            });
+        }
         if !matches!(self.solver(), Solver::Ridge(_)) {
             return Err(Error::Conflict {
                 first: "a solver other than ridge",
                 second: "uncertainty",
             });
         }
-        let model = self.fit(x, t)?;
-        let hidden = model.hidden_matrix(x)?;
-        let validator = Validator::new(&self.problem(&hidden, t.as_matrix(), None)?)?;
+        let model = self.fit_dataset(data)?;
+        let hidden = model.hidden_matrix(&data.inputs())?;
+        let problem = self.problem(&hidden, data.target_matrix(), None)?;
+        let validator = CrossValidator::new(&problem)?;
         let left_out = validator
             .leave_one_out(&model.diagnosis().lambda)?
             .residuals()
@@ -220,9 +206,10 @@ impl<A: Scalar> CheckedParams<A> {
     }
 }
 
-impl<A: Scalar> UncertainElm<A> {
-    fn new(members: Vec<Member<A>>, x: &ArrayRef2<A>, t: ArrayView2<'_, A>) -> Result<Self> {
-        let models: Vec<&Elm<A>> = members.iter().map(|member| &member.model).collect();
+impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
+    fn new(members: Vec<Member<A, D>>, data: &Dataset<'_, A, D>) -> Result<Self> {
+        let (x, t) = (data.inputs(), data.target_matrix());
+        let models: Vec<&Elm<A, D>> = members.iter().map(|member| &member.model).collect();
         let share = A::from_f64(members.len() as f64).recip();
         let mut left_out = Array2::zeros(t.dim());
         let mut variances = Array2::ones(t.dim());
@@ -237,7 +224,7 @@ impl<A: Scalar> UncertainElm<A> {
             .and(&variances)
             .map_collect(|e, v| e.abs() / v.sqrt());
         let mut model = Elm::mean(&models);
-        let residuals = &t - &model.predict(x)?;
+        let residuals = &t - &model.predict_matrix(&x)?;
         if members.len() > 1 {
             model.set_errors(residuals.view(), left_out.view());
         }
@@ -250,7 +237,7 @@ impl<A: Scalar> UncertainElm<A> {
                 A::from_f64((stats::sum(products).max(0.0) / rows).sqrt())
             });
         Ok(Self {
-            steepness: steepness(&model, x),
+            steepness: steepness(&model, &x),
             model,
             members,
             left_out,
@@ -261,19 +248,20 @@ impl<A: Scalar> UncertainElm<A> {
 
     /// The network; of an ensemble the mean of its members.
     #[must_use]
-    pub fn model(&self) -> &Elm<A> {
+    pub fn model(&self) -> &Elm<A, D> {
         &self.model
     }
 
     /// The networks whose mean [`model`](Self::model) is: one, unless this is an ensemble.
-    pub fn members(&self) -> impl ExactSizeIterator<Item = &Elm<A>> {
+    pub fn members(&self) -> impl ExactSizeIterator<Item = &Elm<A, D>> {
         self.members.iter().map(|member| &member.model)
     }
 
     /// The leave-one-out RMSE of each output.
     #[must_use]
-    pub fn leave_one_out(&self) -> Vec<f64> {
-        root_mean_squares(self.left_out.view()).to_vec()
+    pub fn leave_one_out(&self) -> D::PerOutput<f64> {
+        let errors = root_mean_squares(self.left_out.view());
+        per_output::<D, _>(errors.len(), |output| errors[output])
     }
 
     /// The leave-one-out RMSE that each member has by itself, shape (members, outputs): how much
@@ -294,22 +282,23 @@ impl<A: Scalar> UncertainElm<A> {
     ///
     /// # Errors
     /// Those of [`Elm::predict`].
-    pub fn members_spread(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
-        let predictions = self.members().map(|member| member.predict(x));
+    pub fn members_spread<X: Inputs<A> + ?Sized>(&self, x: &X) -> Result<Array<A, D>> {
+        let x = x.as_matrix();
+        let predictions = self.members().map(|member| member.predict_matrix(&x));
         let predictions = predictions.collect::<Result<Vec<_>>>()?;
-        let mean = self.model.predict(x)?;
+        let mean = self.model.predict_matrix(&x)?;
         let mut squares = Array2::zeros(mean.dim());
         for prediction in &predictions {
             squares += &(prediction - &mean).mapv_into(|d| d * d);
         }
         let others = A::from_f64(predictions.len().saturating_sub(1).max(1) as f64);
-        finite(squares.mapv_into(|s: A| (s / others).sqrt()))
+        finite(squares.mapv_into(|s: A| (s / others).sqrt())).map(D::of_matrix)
     }
 
     /// The estimated standard deviation of the noise of each output.
     #[must_use]
-    pub fn noise(&self) -> &Array1<A> {
-        &self.noise
+    pub fn noise(&self) -> D::PerOutput<A> {
+        per_output::<D, _>(self.noise.len(), |output| self.noise[output])
     }
 
     /// What each output may change by, as a root mean square, between the edge of the data and rows
@@ -349,16 +338,17 @@ impl<A: Scalar> UncertainElm<A> {
     ///
     /// # Errors
     /// Those of [`Elm::hidden_matrix`]; [`Error::Overflow`].
-    pub fn predict_deviation(&self, x: &ArrayRef2<A>) -> Result<Array2<A>> {
+    pub fn predict_deviation<X: Inputs<A> + ?Sized>(&self, x: &X) -> Result<Array<A, D>> {
+        let x = x.as_matrix();
         let share = A::from_f64(self.members.len() as f64).recip();
         let mut spread = Array2::zeros((x.nrows(), self.model.outputs()));
         for member in &self.members {
-            let hidden = member.model.hidden_matrix(x)?;
+            let hidden = member.model.hidden_matrix(&x)?;
             spread.scaled_add(share, &member.spread(&hidden));
         }
         let mut deviation = spread.mapv_into(|s| (A::one() + s).sqrt()) * &self.noise;
-        deviation.zip_mut_with(&self.change_outside(x), |d, &change| *d = d.hypot(change));
-        finite(deviation)
+        deviation.zip_mut_with(&self.change_outside(&x), |d, &change| *d = d.hypot(change));
+        finite(deviation).map(D::of_matrix)
     }
 
     /// Lower and upper ends of jackknife+ intervals that cover a new observation with about this
@@ -371,11 +361,11 @@ impl<A: Scalar> UncertainElm<A> {
     /// # Errors
     /// [`Error::Parameter`] unless `coverage` lies strictly between 0 and 1; those of
     /// [`Elm::predict`].
-    pub fn predict_interval(
+    pub fn predict_interval<X: Inputs<A> + ?Sized>(
         &self,
-        x: &ArrayRef2<A>,
+        x: &X,
         coverage: f64,
-    ) -> Result<(Array2<A>, Array2<A>)> {
+    ) -> Result<(Array<A, D>, Array<A, D>)> {
         if !(coverage > 0.0 && coverage < 1.0) {
             return Err(Error::Parameter {
                 name: "coverage",
@@ -383,8 +373,9 @@ impl<A: Scalar> UncertainElm<A> {
                 expected: "above 0 and below 1",
             });
         }
-        let predicted = self.model.predict(x)?;
-        let hidden = self.members().map(|member| member.hidden_matrix(x));
+        let x = x.as_matrix();
+        let predicted = self.model.predict_matrix(&x)?;
+        let hidden = self.members().map(|member| member.hidden_matrix(&x));
         let hidden = hidden.collect::<Result<Vec<_>>>()?;
         let rows = self.left_out.nrows();
         // The k-th smallest and largest of n ends, k = floor(alpha (n + 1)).
@@ -394,10 +385,10 @@ impl<A: Scalar> UncertainElm<A> {
         let mut low = Array2::from_elem(predicted.dim(), A::neg_infinity());
         let mut high = Array2::from_elem(predicted.dim(), A::infinity());
         if outside == 0 {
-            return Ok((low, high));
+            return Ok((D::of_matrix(low), D::of_matrix(high)));
         }
         let share = A::from_f64(self.members.len() as f64).recip();
-        let change = self.change_outside(x);
+        let change = self.change_outside(&x);
         let mut spread = Array2::ones(predicted.dim());
         for (member, hidden) in self.members.iter().zip(&hidden) {
             spread.scaled_add(share, &member.spread(hidden));
@@ -424,11 +415,11 @@ impl<A: Scalar> UncertainElm<A> {
                 }
                 halves.mapv_inplace(A::sqrt);
                 halves *= &scores;
-                let centre = predicted[[row, output]];
+                let center = predicted[[row, output]];
                 let wider = A::from_f64(6.0) * change[[row, output]];
                 let mut end = |sign: A| {
                     for ((end, &half), &moved) in ends.iter_mut().zip(&halves).zip(&moves) {
-                        *end = sign * (centre - moved) - half;
+                        *end = sign * (center - moved) - half;
                     }
                     let (_, value, _) = ends.select_nth_unstable_by(outside - 1, |a, b| {
                         a.as_f64().total_cmp(&b.as_f64())
@@ -439,13 +430,13 @@ impl<A: Scalar> UncertainElm<A> {
                 high[[row, output]] = end(-A::one());
             }
         }
-        Ok((low, high))
+        Ok((D::of_matrix(low), D::of_matrix(high)))
     }
 }
 
 /// The mean square slope of each output along each input, shape (inputs, outputs), over at most some
 /// thousand rows spread evenly.
-fn steepness<A: Scalar>(model: &Elm<A>, x: &ArrayRef2<A>) -> Array2<A> {
+fn steepness<A: Scalar, D: TargetDim>(model: &Elm<A, D>, x: &ArrayRef2<A>) -> Array2<A> {
     const ROWS: usize = 1000;
     let rows = x
         .slice(s![..;x.nrows().div_ceil(ROWS).max(1), ..])

@@ -5,7 +5,7 @@
 #![allow(clippy::unwrap_used)]
 
 use elm::solve::{PseudoInverse, Ridge, Solver};
-use elm::{Activation, ElmParams, Scaler};
+use elm::{Activation, Dataset, ElmParams, Scaler};
 use elm_brdf::features::Features;
 use elm_brdf::link::Link;
 use elm_brdf::model::{BrdfParams, GlobalScaling};
@@ -37,23 +37,20 @@ fn one_factorisation_is_refitting(data: &Measurements) {
         Ridge::relative(1e-9).into(),
     ] {
         let params = ElmParams::new(50)
-            .solver(solver)
-            .intercept(false)
-            .bounded(false)
-            .seed(1);
+            .with_solver(solver)
+            .with_intercept(false)
+            .with_bounded(false)
+            .with_seed(1);
         // All folds of all materials, from one call and one factorisation.
         let fits = params
-            .clone()
-            .check()
-            .unwrap()
-            .cross_fits(&x, &t, &labels)
+            .fold_predictions(&Dataset::new(&x, &t).unwrap(), &labels)
             .unwrap();
         assert_eq!(fits.len(), 10);
 
         // The same network fold by fold: inputs are scaled already, by all rows. Strengths are
         // relative to each fold's own matrix, so the absolute one is carried over.
         let x = scaled(&x);
-        let refit = params.standardise(false);
+        let refit = params.with_standardize(false);
         let whole = refit.clone().fit(&x, &t).unwrap();
         for fit in &fits {
             let kept: Vec<usize> = (0..x.nrows())
@@ -65,7 +62,7 @@ fn one_factorisation_is_refitting(data: &Measurements) {
                 let of_fold = refit.fit(&x_kept, &t_kept).unwrap();
                 let size = |model: &elm::Elm<f64>| model.diagnosis().largest_singular_value;
                 let ratio = size(&whole) / size(&of_fold);
-                fold = fold.solver(Ridge::relative(1e-9 * ratio * ratio));
+                fold = fold.with_solver(Ridge::relative(1e-9 * ratio * ratio));
             }
             let truth = fold.fit(&x_kept, &t_kept).unwrap().predict(&x).unwrap();
             let error = largest((&fit.predictions() - &truth).view());
@@ -88,11 +85,11 @@ fn where_nothing_is_scaled_scaling_once_is_scaling_in_each_fold() {
         link: Link::Identity,
         // Well conditioned, so that the two routes have the same digits.
         network: ElmParams::new(30)
-            .activation(Activation::Sine)
-            .scale(3.0)
-            .solver(PseudoInverse::default())
-            .standardise(false)
-            .intercept(false),
+            .with_activation(Activation::Sine)
+            .with_scale(3.0)
+            .with_solver(PseudoInverse::default())
+            .with_standardize(false)
+            .with_intercept(false),
     };
     let each = cross_validate(&params, &data, &folds, |_, _| {}).unwrap();
     let once = GlobalScaling::new(params).unwrap();

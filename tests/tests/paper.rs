@@ -25,7 +25,7 @@ fn params(network: ElmParams<f64>) -> BrdfParams {
     BrdfParams {
         features: Features::Paper,
         link: Link::Identity,
-        network: network.intercept(false),
+        network: network.with_intercept(false),
     }
 }
 
@@ -33,7 +33,7 @@ fn params(network: ElmParams<f64>) -> BrdfParams {
 fn fitting_materials_together_gives_what_fitting_each_alone_gives() {
     let together = stand_in();
     let folds = Folds::new(205, 10, 3).unwrap();
-    let paper = params(ElmParams::new(50).solver(PseudoInverse::default()));
+    let paper = params(ElmParams::new(50).with_solver(PseudoInverse::default()));
     let all = cross_validate(&paper, &together, &folds, |_, _| {}).unwrap();
     for id in [1, 30, 61] {
         let id = MaterialId::new(id).unwrap();
@@ -56,16 +56,16 @@ fn with_as_many_neurons_as_rows_equation_10_interpolates_and_agrees_with_equatio
     // smooth sigmoid on six dependent inputs does not.
     let network = |scale| {
         ElmParams::new(40)
-            .activation(elm::Activation::Sine)
-            .scale(scale)
-            .seed(2)
+            .with_activation(elm::Activation::Sine)
+            .with_scale(scale)
+            .with_seed(2)
     };
     let rows = &samples.directions[..40];
     let values = samples.values.slice(s![..40, ..]);
-    let exact = params(network(30.0).solver(Inverse))
+    let exact = params(network(30.0).with_solver(Inverse))
         .fit(rows, values)
         .unwrap();
-    let least = params(network(30.0).solver(PseudoInverse::default()))
+    let least = params(network(30.0).with_solver(PseudoInverse::default()))
         .fit(rows, values)
         .unwrap();
     let (exact, least) = (exact.eval(rows).unwrap(), least.eval(rows).unwrap());

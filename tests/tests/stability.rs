@@ -91,7 +91,7 @@ fn a_nan_is_refused_before_any_factorisation() {
         Ridge::gcv().into(),
         Solver::default(),
     ] {
-        let params = ElmParams::new(300).solver(solver);
+        let params = ElmParams::new(300).with_solver(solver);
         assert_eq!(params.fit(&h, &t).map(|_| ()), Err(expected("inputs")));
     }
 }

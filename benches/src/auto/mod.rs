@@ -6,7 +6,7 @@ pub mod problems;
 use std::time::Instant;
 
 use elm::solve::Ridge;
-use elm::{Activation, Biases, ElmParams, Tuner};
+use elm::{Activation, Biases, Dataset, ElmParams, Tuner};
 use ndarray::{Array1, Array2, Axis, concatenate, s};
 use serde::Serialize;
 
@@ -34,7 +34,7 @@ impl Subject {
 
     fn tuner(self, seed: u64) -> Tuner<f64> {
         match self {
-            Self::Auto => ElmParams::auto().seed(seed),
+            Self::Auto => ElmParams::auto().with_seed(seed),
             Self::Given => base(200, seed).tuner(),
         }
     }
@@ -80,9 +80,9 @@ const TEST_ROWS: usize = 2000;
 /// The grid's layers: those that `auto` draws, but with one scale for all inputs.
 fn base(neurons: usize, seed: u64) -> ElmParams<f64> {
     ElmParams::new(neurons)
-        .activation(Activation::Tanh)
-        .biases(Biases::OnData)
-        .seed(seed)
+        .with_activation(Activation::Tanh)
+        .with_biases(Biases::AtTrainingRows)
+        .with_seed(seed)
 }
 
 /// Runs a problem at a seed; nothing where it cannot be drawn or fitted, which its caller reports.
@@ -94,7 +94,7 @@ pub fn run(problem: &Problem, subject: Subject, seed: u64) -> Option<Record> {
     let (x, t) = problem.train(seed)?;
     let (x_test, test) = problem.test(seed, TEST_ROWS, 1.0)?;
     let start = Instant::now();
-    let tuned = subject.tuner(seed).tune(&x, &t).ok()?;
+    let tuned = subject.tuner(seed).tune(&Dataset::new(&x, &t).ok()?).ok()?;
     let seconds = start.elapsed().as_secs_f64();
     // Both measures at once, as outputs side by side.
     let test = concatenate(Axis(1), &[test[0].view(), test[1].view()]).ok()?;
@@ -149,8 +149,8 @@ fn best_of_grid(
             // Any strength: only the layer is needed.
             let any = Ridge::relative(1.0);
             let layer = base(neurons, seed)
-                .scale(scale)
-                .solver(any)
+                .with_scale(scale)
+                .with_solver(any)
                 .fit(x, t)
                 .ok()?;
             let hidden = layer.hidden_matrix(x).ok()?;

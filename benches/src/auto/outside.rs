@@ -1,6 +1,6 @@
 //! What `ElmParams::auto` predicts outside the rows that it was fitted to.
 
-use elm::ElmParams;
+use elm::{Dataset, ElmParams};
 use ndarray::{Array2, Axis};
 use serde::Serialize;
 
@@ -31,9 +31,15 @@ pub struct Outside {
 #[must_use]
 pub fn run(problem: &Problem, seed: u64) -> Option<Outside> {
     let (x, t) = problem.train(seed)?;
-    let tuned = ElmParams::auto().seed(seed).tune(&x, &t).ok()?;
-    let free = tuned.model.clone().bounded(false);
-    let uncertain = tuned.params.fit_uncertain(&x, &t).ok()?;
+    let tuned = ElmParams::auto()
+        .with_seed(seed)
+        .tune(&Dataset::new(&x, &t).ok()?)
+        .ok()?;
+    let free = tuned.model.clone().with_bounded(false);
+    let uncertain = tuned
+        .params
+        .fit_uncertain(&Dataset::new(&x, &t).ok()?)
+        .ok()?;
     let deviation = t.std_axis(Axis(0), 0.0);
     let (mut rmse, mut unbounded, mut coverage) = ([0.0; 2], [0.0; 2], [0.0; 2]);
     let mut outside = 0.0;

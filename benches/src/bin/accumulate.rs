@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use elm::solve::{LeastSquares, Ridge, Solver};
-use elm::{Accumulator, CheckedParams, ElmParams, Error};
+use elm::{Accumulator, ElmParams, Error};
 use ndarray::{Array2, Axis};
 use peak_alloc::PeakAlloc;
 use rand::{Rng, SeedableRng};
@@ -62,8 +62,8 @@ impl Arguments {
         })
     }
 
-    fn params(&self) -> Result<CheckedParams<f64>, Error> {
-        ElmParams::new(self.neurons).solver(ridge()).check()
+    fn params(&self) -> ElmParams<f64> {
+        ElmParams::new(self.neurons).with_solver(ridge())
     }
 }
 
@@ -80,7 +80,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 fn memory(arguments: &Arguments) -> Result<(), Error> {
-    let params = arguments.params()?;
+    let params = arguments.params();
     let rows = arguments.chunk.min(arguments.rows);
     let chunk = (arguments.inputs + 1) * rows * size_of::<f64>();
     let before = MEMORY.current_usage();
@@ -123,7 +123,7 @@ fn batch(arguments: &Arguments) -> Result<(), Error> {
         at += x.nrows();
     }
     let (x, t) = whole;
-    let params = arguments.params()?;
+    let params = arguments.params();
     let chunked = params.fit_chunks(arguments.chunks(rows))?;
     // Standardised as the first chunk says, in one piece.
     let mut one = Accumulator::from_sample(
@@ -134,7 +134,7 @@ fn batch(arguments: &Arguments) -> Result<(), Error> {
     one.push(&x, &t)?;
     let one = one.fit()?;
     let hidden = chunked.hidden_matrix(&x)?;
-    let problem = LeastSquares::new(&hidden, &t)?.intercept(true);
+    let problem = LeastSquares::new(&hidden, &t)?.with_intercept(true);
     let solution = Solver::from(ridge()).solve(&problem)?;
     let batch = hidden.dot(&solution.beta) + &solution.intercept;
     let condition = chunked.diagnosis().condition.unwrap_or(f64::NAN);
@@ -155,7 +155,7 @@ fn batch(arguments: &Arguments) -> Result<(), Error> {
 
 /// Pairs of fits, one thread and several in turn, the chunks drawn beforehand.
 fn threads(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
-    let params = arguments.params()?;
+    let params = arguments.params();
     let chunks: Vec<Chunk> = arguments
         .chunks(arguments.timed)
         .collect::<Result<_, _>>()?;

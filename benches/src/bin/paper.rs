@@ -54,9 +54,9 @@ fn row(
     let mut figures: Vec<[f64; 4]> = Vec::new();
     for seed in 1..=SEEDS {
         let network = ElmParams::new(neurons)
-            .solver(solver)
-            .intercept(false)
-            .seed(seed);
+            .with_solver(solver)
+            .with_intercept(false)
+            .with_seed(seed);
         let params = BrdfParams {
             features: Features::Paper,
             link: Link::Identity,

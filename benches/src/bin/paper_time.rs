@@ -104,9 +104,9 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn network() -> ElmParams<f64> {
     ElmParams::new(NEURONS)
-        .solver(PseudoInverse::default())
-        .intercept(false)
-        .seed(SEED)
+        .with_solver(PseudoInverse::default())
+        .with_intercept(false)
+        .with_seed(SEED)
 }
 
 fn one_channel(mut data: Measurements) -> Measurements {

@@ -6,7 +6,7 @@ use clap::{Parser, ValueEnum};
 use elm::solve::{PseudoInverse, Ridge};
 use elm::{Elm, ElmParams, Scalar, metrics};
 use elm_benches::timing::processor_seconds;
-use ndarray::{Array1, Array2, ArrayView1, Axis};
+use ndarray::{Array1, Array2, ArrayView1, Axis, Ix1};
 use peak_alloc::PeakAlloc;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -70,14 +70,14 @@ impl Arguments {
         (x, t)
     }
 
-    fn fit<A: Scalar>(&self, fit: Fit, x: &Array2<A>, t: &Array1<A>) -> elm::Result<Elm<A>> {
-        let params = ElmParams::new(self.neurons).scale(self.scale);
+    fn fit<A: Scalar>(&self, fit: Fit, x: &Array2<A>, t: &Array1<A>) -> elm::Result<Elm<A, Ix1>> {
+        let params = ElmParams::new(self.neurons).with_scale(self.scale);
         match fit {
-            Fit::Relative => params.solver(Ridge::relative(1e-6)),
-            Fit::Weak => params.solver(Ridge::relative(1e-12)),
+            Fit::Relative => params.with_solver(Ridge::relative(1e-6)),
+            Fit::Weak => params.with_solver(Ridge::relative(1e-12)),
             Fit::LeaveOneOut => params,
-            Fit::Gcv => params.solver(Ridge::gcv()),
-            Fit::PseudoInverse => params.solver(PseudoInverse::default()),
+            Fit::Gcv => params.with_solver(Ridge::gcv()),
+            Fit::PseudoInverse => params.with_solver(PseudoInverse::default()),
             Fit::Auto => return ElmParams::auto().fit(x, t),
         }
         .fit(x, t)
@@ -100,7 +100,7 @@ impl Arguments {
             let model = self.fit(fit, &x, &t)?;
             let seconds = processor_seconds() - start;
             let peak = MEMORY.peak_usage();
-            let error = metrics::rmse(&model.predict(&test)?.column(0), &truth)?;
+            let error = metrics::rmse(&model.predict(&test)?, &truth)?;
             let diagnosis = model.diagnosis();
             println!(
                 "{fit:?}: {} neurons, {seconds:.1} s, {:.0} MB at most; RMSE {error:.5}, lambda \

@@ -123,10 +123,10 @@ pub(super) struct Ours {
 impl Ours {
     pub(super) fn fit<A: Scalar>(&self, x: &Array2<A>, t: &Array2<A>) -> Result<Elm<A>, String> {
         ElmParams::new(self.neurons)
-            .activation(Activation::Tanh)
-            .scale(self.scale)
-            .seed(self.seed)
-            .solver(Ridge::relative(self.lambda))
+            .with_activation(Activation::Tanh)
+            .with_scale(self.scale)
+            .with_seed(self.seed)
+            .with_solver(Ridge::relative(self.lambda))
             .fit(x, t)
             .map_err(|error| error.to_string())
     }

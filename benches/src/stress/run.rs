@@ -227,7 +227,7 @@ impl<A: Scalar> Task<A> {
         Self {
             params: match problem.level {
                 Level::Data { neurons, scale } => {
-                    Some(ElmParams::new(neurons).scale(scale).seed(seed))
+                    Some(ElmParams::new(neurons).with_scale(scale).with_seed(seed))
                 }
                 Level::Matrix => None,
             },
@@ -248,7 +248,7 @@ impl<A: Scalar> Task<A> {
             (Some(_), Some(Ok(network))) => Ok(Some(network.clone())),
             // The layer is the same whatever the solver.
             (Some(params), _) => {
-                let other = params.clone().solver(Ridge::relative(1.0));
+                let other = params.clone().with_solver(Ridge::relative(1.0));
                 other.fit(&self.train, &self.targets).map(Some)
             }
             (None, _) => Ok(None),
@@ -320,7 +320,7 @@ impl<A: Scalar> Task<A> {
 
     fn solve(&self, method: Method, hidden: &Array2<A>, test: &Array2<A>) -> elm::Result<Fit> {
         let intercept = self.params.is_some() && method != Method::Inverse;
-        let problem = LeastSquares::new(hidden, &self.targets)?.intercept(intercept);
+        let problem = LeastSquares::new(hidden, &self.targets)?.with_intercept(intercept);
         let Solution {
             beta,
             intercept,

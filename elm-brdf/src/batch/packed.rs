@@ -1,7 +1,7 @@
 //! A network of this project, packed for evaluation by columns.
 
 use crate::fit::Model;
-use elm::{Activation, Kind};
+use elm::{Activation, NodeType};
 use elm_datasets::brdf::EvalError;
 use ndarray::Array2;
 use ndarray::ArrayViewMut2;
@@ -73,7 +73,7 @@ impl<A: Real> Packed<A> {
         if layer
             .groups()
             .iter()
-            .any(|group| group.kind() != Kind::Projection)
+            .any(|group| group.node_type() != NodeType::Additive)
         {
             return refused("radial neurons");
         }

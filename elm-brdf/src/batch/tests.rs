@@ -5,7 +5,7 @@ use crate::features::Features;
 use crate::link::Link;
 use crate::model::{BrdfModel, BrdfParams};
 use elm::solve::Ridge;
-use elm::{Activation, ElmParams, Kind};
+use elm::{Activation, ElmParams, NodeType};
 use elm_datasets::Brdf;
 use elm_datasets::geometry::cartesian;
 use ndarray::Array2;
@@ -38,7 +38,7 @@ fn model(features: Features, link: Link, network: ElmParams<f64>, channels: usiz
     BrdfParams {
         features,
         link,
-        network: network.solver(Ridge::relative(1e-6)),
+        network: network.with_solver(Ridge::relative(1e-6)),
     }
     .fit_model(&pairs, values.view())
     .unwrap()
@@ -56,7 +56,9 @@ fn every_set_of_inputs_link_and_function_gives_what_the_general_way_gives() {
             }
             let link = links[(number + other) % 3];
             let channels = [1, 3, 4][other % 3];
-            let network = ElmParams::new(25).activation(function.clone()).seed(3);
+            let network = ElmParams::new(25)
+                .with_activation(function.clone())
+                .with_seed(3);
             let model = model(features, link, network, channels);
             let expected = model.eval(&pairs).unwrap();
             let packed: Packed<f64> = Packed::new(&model).unwrap();
@@ -80,7 +82,7 @@ fn every_set_of_inputs_link_and_function_gives_what_the_general_way_gives() {
 
 #[test]
 fn a_row_does_not_depend_on_the_rows_beside_it() {
-    let network = ElmParams::new(20).activation(Activation::SquaredRelu);
+    let network = ElmParams::new(20).with_activation(Activation::SquaredRelu);
     let model = model(Features::Algebraic, Link::default_log(), network, 3);
     let packed: Packed<f32> = Packed::new(&model).unwrap();
     let pairs = directions(2 * ROWS + 5);
@@ -95,9 +97,9 @@ fn a_row_does_not_depend_on_the_rows_beside_it() {
 #[test]
 fn neurons_of_two_functions_are_evaluated_each_by_its_own() {
     let network = ElmParams::new(7)
-        .activation(Activation::Sine)
-        .and(elm::Neurons::new(5, Activation::SquaredRelu))
-        .and(elm::Neurons::new(4, Activation::Tanh));
+        .with_activation(Activation::Sine)
+        .with_group(elm::NeuronGroup::new(5, Activation::SquaredRelu))
+        .with_group(elm::NeuronGroup::new(4, Activation::Tanh));
     let model = model(Features::Cosines, Link::default_log(), network, 3);
     let packed: Packed<f64> = Packed::new(&model).unwrap();
     let pairs = directions(70);
@@ -107,7 +109,7 @@ fn neurons_of_two_functions_are_evaluated_each_by_its_own() {
 
 #[test]
 fn below_the_horizon_and_for_what_is_no_direction_values_are_black_or_finite() {
-    let network = ElmParams::new(20).activation(Activation::Relu);
+    let network = ElmParams::new(20).with_activation(Activation::Relu);
     let model = model(Features::Algebraic, Link::default_log(), network, 3);
     let packed: Packed<f32> = Packed::new(&model).unwrap();
     let up = [0.0, 0.0, 1.0];
@@ -139,12 +141,12 @@ fn below_the_horizon_and_for_what_is_no_direction_values_are_black_or_finite() {
 fn what_does_not_fit_is_refused() {
     let own = Activation::custom("cube", |z: f64| z * z * z);
     let networks = [
-        (ElmParams::new(9).activation(own), "own"),
-        (ElmParams::new(9).direct_links(true), "links"),
+        (ElmParams::new(9).with_activation(own), "own"),
+        (ElmParams::new(9).with_direct_links(true), "links"),
         (
             ElmParams::new(9)
-                .activation(Activation::Gaussian)
-                .kind(Kind::Radial),
+                .with_activation(Activation::Gaussian)
+                .with_node_type(NodeType::Rbf),
             "radial",
         ),
     ];
@@ -166,7 +168,7 @@ fn what_does_not_fit_is_refused() {
 
 #[test]
 fn a_model_of_many_channels_is_that_of_each_by_itself() {
-    let network = ElmParams::new(20).activation(Activation::SquaredRelu);
+    let network = ElmParams::new(20).with_activation(Activation::SquaredRelu);
     let model = model(Features::Algebraic, Link::CubeRoot, network, 7);
     let packed: Packed<f64> = Packed::new(&model).unwrap();
     let pairs = directions(80);

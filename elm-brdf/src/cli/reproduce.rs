@@ -158,10 +158,10 @@ impl Model {
         let mut params = BrdfParams::paper(arguments.neurons.unwrap_or(50));
         params.network = params
             .network
-            .activation(arguments.activation())
-            .solver(solver)
-            .seed(arguments.seed);
-        params.network.clone().check().map_err(usage)?;
+            .with_activation(arguments.activation())
+            .with_solver(solver)
+            .with_seed(arguments.seed);
+        params.network.check().map_err(usage)?;
         Ok(Self::Paper(Box::new(params), once))
     }
 

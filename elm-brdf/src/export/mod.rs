@@ -22,7 +22,7 @@
 //! let params = BrdfParams {
 //!     features: Features::ReciprocalCosines,
 //!     link: Link::default_log(),
-//!     network: ElmParams::new(40).activation(Activation::Sine).solver(Ridge::leave_one_out()),
+//!     network: ElmParams::new(40).with_activation(Activation::Sine).with_solver(Ridge::leave_one_out()),
 //! };
 //! let model = params.fit_model(&samples.directions, samples.values.view())?;
 //! let shader = source(&model, Language::Glsl, "felt")?;

@@ -1,7 +1,8 @@
 //! A model as its file has it: what was chosen and fitted, and nothing that can be made again.
 
+use elm::advanced::FeatureMap;
 use elm::persist::{self, Persist};
-use elm::{Activation, Elm, FeatureMap, Scaler};
+use elm::{Activation, Elm, Scaler};
 use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
 

@@ -1,5 +1,6 @@
 //! All folds of a cross-validation from one factorisation.
 
+use elm::Dataset;
 use ndarray::{Array2, ArrayView2};
 
 use super::{BrdfModel, BrdfParams};
@@ -49,8 +50,8 @@ impl Fit for GlobalScaling {
         done: &mut dyn FnMut(usize),
     ) -> Result<Vec<Array2<f64>>> {
         let x = self.0.features.compute_training(pairs);
-        let network = self.0.network.clone().bounded(false).check()?;
-        let fits = network.cross_fits(&x, &values, folds)?;
+        let network = self.0.network.clone().with_bounded(false);
+        let fits = network.fold_predictions(&Dataset::new(&x, &values)?, folds)?;
         let mut all = Vec::with_capacity(count);
         for fold in 0..count {
             all.push(match fits.iter().find(|fit| fit.label() == fold) {

@@ -1,6 +1,6 @@
 //! How a model's file keeps its hidden layer: as what draws it again, wherever that can be.
 
-use elm::{FeatureMapParams, HiddenLayer};
+use elm::advanced::{FeatureMapParams, HiddenLayer};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};

@@ -189,16 +189,16 @@ impl BrdfParams {
             features: Features::Paper,
             link: Link::Identity,
             network: ElmParams::new(neurons)
-                .activation(Activation::Sigmoid)
-                .solver(PseudoInverse::default())
-                .intercept(false),
+                .with_activation(Activation::Sigmoid)
+                .with_solver(PseudoInverse::default())
+                .with_intercept(false),
         }
     }
 
     /// The same with another seed of the random layer.
     #[must_use]
     pub fn seed(mut self, seed: u64) -> Self {
-        self.network = self.network.seed(seed);
+        self.network = self.network.with_seed(seed);
         self
     }
 
@@ -216,7 +216,7 @@ impl BrdfParams {
         let link = self.link.fit(values)?;
         let t = link.to_targets(values)?;
         // Directions are bounded by themselves, and measurements end short of the horizon.
-        let network = self.network.clone().bounded(false).fit(&x, &t)?;
+        let network = self.network.clone().with_bounded(false).fit(&x, &t)?;
         let layer = Layer::of(self.network.feature_map(), network.hidden());
         Ok(BrdfModel::new(self.features, link, layer, network))
     }

@@ -12,9 +12,11 @@ mod problem;
 mod rows;
 mod survey;
 
-use elm::{Activation, Biases, Distribution, ElmParams, FeatureMap, Neurons, Scaler};
+use elm::advanced::FeatureMap;
+
+use elm::{Activation, Biases, Dataset, Distribution, ElmParams, NeuronGroup, Scaler};
 use elm_datasets::brdf::{EvalError, check_arguments};
-use ndarray::{ArrayView2, ArrayViewMut2, Axis, Slice};
+use ndarray::{Array1, Array2, ArrayView2, ArrayViewMut2, Axis, Slice};
 
 use super::{BrdfModel, Draw, Provenance};
 use crate::error::{Error, Result};
@@ -48,7 +50,7 @@ use problem::Problem;
 ///
 /// **Few measurements** (up to [`Tuned::MANY`]): sine neurons with random frequencies. The scales of
 /// the inputs are tried from a fixed low-discrepancy set and ranked by their
-/// [evidence](elm::validate::Validator::log_evidence); the neurons of the best
+/// [evidence](elm::cross_validation::CrossValidator::log_evidence); the neurons of the best
 /// [`MEMBERS`](Tuned::MEMBERS) stand side by side in one network, which stores no more numbers than twice as
 /// many as were measured, nor than a thousand or half as many. With `neurons` or `max_floats` given, the
 /// best alone is taken.
@@ -209,22 +211,22 @@ impl Tuned {
     fn waves(&self, neurons: usize, input_scales: &[f64]) -> ElmParams<f64> {
         let third = neurons / 3;
         let params = ElmParams::new(neurons - 2 * third)
-            .activation(Activation::Sine)
-            .distribution(Distribution::Normal)
-            .biases(Biases::Scaled(std::f64::consts::PI))
-            .input_scales(input_scales.to_vec())
+            .with_activation(Activation::Sine)
+            .with_distribution(Distribution::Normal)
+            .with_biases(Biases::Scaled(std::f64::consts::PI))
+            .with_input_scales(input_scales.to_vec())
             // Directions are bounded by themselves, and measurements end short of the horizon.
-            .bounded(false)
-            .seed(self.seed);
+            .with_bounded(false)
+            .with_seed(self.seed);
         let group = |scale: f64| {
-            Neurons::new(third, Activation::Sine)
-                .scale(scale)
-                .biases(Biases::Scaled(std::f64::consts::PI))
+            NeuronGroup::new(third, Activation::Sine)
+                .with_scale(scale)
+                .with_biases(Biases::Scaled(std::f64::consts::PI))
         };
         if third == 0 {
             return params;
         }
-        params.and(group(0.6)).and(group(1.7))
+        params.with_group(group(0.6)).with_group(group(1.7))
     }
 }
 
@@ -399,4 +401,17 @@ fn provenance(
         noise_floor: (channels > 0).then(|| floors.iter().sum::<f64>() / channels as f64),
         ..Provenance::default()
     }
+}
+
+/// Rows that may have weights.
+fn dataset<'a>(
+    x: &'a Array2<f64>,
+    targets: &'a Array2<f64>,
+    weights: Option<&'a Array1<f64>>,
+) -> Result<Dataset<'a, f64>> {
+    let data = Dataset::new(x, targets)?;
+    Ok(match weights {
+        Some(weights) => data.with_weights(weights)?,
+        None => data,
+    })
 }

@@ -52,9 +52,9 @@ pub(super) fn networks(seed: u64) -> [ModelEntry; 4] {
                 features: Features::Cosines,
                 link: Link::default_log(),
                 network: ElmParams::new(200)
-                    .seed(seed)
-                    .activation(Activation::Sine)
-                    .solver(Ridge::leave_one_out()),
+                    .with_seed(seed)
+                    .with_activation(Activation::Sine)
+                    .with_solver(Ridge::leave_one_out()),
             },
         ),
         tuned(TUNED, seed),

@@ -18,8 +18,8 @@ pub(crate) fn library(curet: Option<PathBuf>) -> SceneMaterialLoader {
                 features: Features::ReciprocalCosines,
                 link: Link::default_log(),
                 network: ElmParams::new(40)
-                    .activation(Activation::Tanh)
-                    .solver(Ridge::leave_one_out()),
+                    .with_activation(Activation::Tanh)
+                    .with_solver(Ridge::leave_one_out()),
             })
         }),
     )

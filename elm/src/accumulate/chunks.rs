@@ -1,16 +1,17 @@
 //! Fits to an iterator of chunks of rows, on one thread or on several.
 
-use ndarray::{Array2, Axis, concatenate};
+use ndarray::{Array, Array2, Axis, concatenate};
 #[cfg(feature = "rayon")]
 use rayon::prelude::*;
 
 use super::Accumulator;
 use crate::check::check_matrix;
+use crate::dataset::TargetDim;
 use crate::error::{Error, Result};
 use crate::feature_map::Scaler;
 #[cfg(feature = "rayon")]
 use crate::memory::check_room;
-use crate::model::CheckedParams;
+use crate::model::ElmParams;
 use crate::network::Elm;
 use crate::scalar::Scalar;
 
@@ -25,21 +26,24 @@ const NO_CHUNKS: Error = Error::Empty {
 const SAMPLE_ROWS: usize = 1000;
 
 /// Inputs and targets of some rows.
-type Chunk<A> = (Array2<A>, Array2<A>);
+type Chunk<A, D> = (Array2<A>, Array<A, D>);
+
+/// An accumulator, and the chunks that it was made for.
+type Start<A, D> = (Accumulator<A, D>, Vec<Chunk<A, D>>);
 
 /// The first chunks, up to [`SAMPLE_ROWS`] rows in total, and an accumulator made for rows like
 /// these.
-fn start<A: Scalar, E: From<Error>>(
-    params: &CheckedParams<A>,
+fn start<A: Scalar, D: TargetDim, E: From<Error>>(
+    params: &ElmParams<A>,
     scaler: Option<Scaler<A>>,
-    chunks: &mut impl Iterator<Item = Result<Chunk<A>, E>>,
-) -> Result<(Accumulator<A>, Vec<Chunk<A>>), E> {
-    let wanted = if scaler.is_some() && !params.needs_rows() {
+    chunks: &mut impl Iterator<Item = Result<Chunk<A, D>, E>>,
+) -> Result<Start<A, D>, E> {
+    let wanted = if scaler.is_some() && !params.feature_map().needs_rows() {
         1
     } else {
         SAMPLE_ROWS
     };
-    let (mut first, mut rows): (Vec<Chunk<A>>, _) = (Vec::new(), 0);
+    let (mut first, mut rows): (Vec<Chunk<A, D>>, _) = (Vec::new(), 0);
     while rows < wanted
         && let Some(chunk) = chunks.next().transpose()?
     {
@@ -48,7 +52,8 @@ fn start<A: Scalar, E: From<Error>>(
         rows += chunk.0.nrows();
         first.push(chunk);
     }
-    let outputs = first.first().ok_or(NO_CHUNKS)?.1.ncols();
+    let outputs = &first.first().ok_or(NO_CHUNKS)?.1;
+    let outputs = D::matrix_view(outputs.view()).ncols();
     let sample = match first.as_slice() {
         [(x, _)] => Ok(x.view().into()),
         several => {
@@ -72,12 +77,12 @@ fn start<A: Scalar, E: From<Error>>(
     Ok((accumulator, first))
 }
 
-impl<A: Scalar> CheckedParams<A> {
+impl<A: Scalar> ElmParams<A> {
     /// Fits to chunks of rows that never stand in memory together: `chunks` yields inputs and
     /// targets as [`fit`](Self::fit) takes them, or the error of whatever reads them. Leave-one-out is
     /// replaced; see [`Accumulator`].
     ///
-    /// Inputs are standardised by the **first** chunks, up to a thousand rows in total, which are in
+    /// Inputs are standardized by the **first** chunks, up to a thousand rows in total, which are in
     /// memory together until then. The others should be like them: an
     /// input that was constant and no longer is, or now lies far outside, is an
     /// [error](Accumulator::push). Rows in an order of their own, by time or place, are better measured
@@ -85,32 +90,31 @@ impl<A: Scalar> CheckedParams<A> {
     ///
     /// ```
     /// use elm::{ElmParams, Error};
-    /// use ndarray::Array2;
+    /// use ndarray::{Array2, Axis};
     ///
     /// // Stands for a file that is read piece by piece.
     /// let chunks = (0..10).map(|chunk| {
-    ///     let row = |i: usize| (50 * chunk + i) as f64;
-    ///     let x = Array2::from_shape_fn((50, 2), |(i, j)| (row(i) * (0.1 + j as f64)).sin());
-    ///     let t = Array2::from_shape_fn((50, 1), |(i, _)| x[[i, 0]] * x[[i, 1]]);
+    ///     let x = Array2::from_shape_fn((50, 2), |(i, j)| ((chunk * 50 + i) as f64 * (0.1 + j as f64)).sin());
+    ///     let t = x.map_axis(Axis(1), |row| row[0] * row[1]);
     ///     Ok::<_, Error>((x, t))
     /// });
-    /// let model = ElmParams::new(60).check()?.fit_chunks(chunks)?;
+    /// let model = ElmParams::new(60).fit_chunks(chunks)?;
     /// let y = model.predict(&ndarray::array![[0.5, -0.5]])?;
-    /// assert!((y[[0, 0]] + 0.25_f64).abs() < 0.01);
+    /// assert!((y[0] + 0.25_f64).abs() < 0.01);
     /// # Ok::<(), Error>(())
     /// ```
     ///
     /// # Errors
     /// The first error of `chunks`, [`Error::Empty`] when there are none, and those of
     /// [`Accumulator::push`] and [`Accumulator::fit`].
-    pub fn fit_chunks<E: From<Error>>(
+    pub fn fit_chunks<D: TargetDim, E: From<Error>>(
         &self,
-        chunks: impl IntoIterator<Item = Result<(Array2<A>, Array2<A>), E>>,
-    ) -> Result<Elm<A>, E> {
+        chunks: impl IntoIterator<Item = Result<(Array2<A>, Array<A, D>), E>>,
+    ) -> Result<Elm<A, D>, E> {
         self.fit_each(None, chunks.into_iter())
     }
 
-    /// As [`fit_chunks`](Self::fit_chunks), with inputs standardised by a scaler that is known
+    /// As [`fit_chunks`](Self::fit_chunks), with inputs standardized by a scaler that is known
     /// beforehand, as from a first pass over the chunks.
     ///
     /// ```
@@ -127,7 +131,7 @@ impl<A: Scalar> CheckedParams<A> {
     /// for number in 0..40 {
     ///     measured.push(&chunk(number)?.0)?;
     /// }
-    /// let params = ElmParams::new(60).check()?;
+    /// let params = ElmParams::new(60);
     /// let model = params.fit_chunks_scaled(measured.build()?, (0..40).map(chunk))?;
     /// let y = model.predict(&ndarray::array![[19.0]])?;
     /// assert!((y[[0, 0]] - 19.0_f64.sin()).abs() < 0.01);
@@ -136,20 +140,20 @@ impl<A: Scalar> CheckedParams<A> {
     ///
     /// # Errors
     /// Those of [`fit_chunks`](Self::fit_chunks); [`Error::Conflict`] when the parameters switch
-    /// standardisation off, [`Error::Shape`] for a scaler of another number of inputs.
-    pub fn fit_chunks_scaled<E: From<Error>>(
+    /// standardization off, [`Error::Shape`] for a scaler of another number of inputs.
+    pub fn fit_chunks_scaled<D: TargetDim, E: From<Error>>(
         &self,
         scaler: Scaler<A>,
-        chunks: impl IntoIterator<Item = Result<(Array2<A>, Array2<A>), E>>,
-    ) -> Result<Elm<A>, E> {
+        chunks: impl IntoIterator<Item = Result<(Array2<A>, Array<A, D>), E>>,
+    ) -> Result<Elm<A, D>, E> {
         self.fit_each(Some(scaler), chunks.into_iter())
     }
 
-    fn fit_each<E: From<Error>>(
+    fn fit_each<D: TargetDim, E: From<Error>>(
         &self,
         scaler: Option<Scaler<A>>,
-        mut chunks: impl Iterator<Item = Result<Chunk<A>, E>>,
-    ) -> Result<Elm<A>, E> {
+        mut chunks: impl Iterator<Item = Result<Chunk<A, D>, E>>,
+    ) -> Result<Elm<A, D>, E> {
         let (mut accumulator, first) = start(self, scaler, &mut chunks)?;
         for chunk in first.into_iter().map(Ok).chain(chunks) {
             let (x, t) = chunk?;
@@ -169,11 +173,11 @@ impl<A: Scalar> CheckedParams<A> {
     /// Those of [`fit_chunks`](Self::fit_chunks); [`Error::Parameter`] for no parts,
     /// [`Error::TooLarge`] for more than memory holds.
     #[cfg(feature = "rayon")]
-    pub fn fit_chunks_parallel<E: From<Error>>(
+    pub fn fit_chunks_parallel<D: TargetDim, E: From<Error>>(
         &self,
-        chunks: impl IntoIterator<Item = Result<(Array2<A>, Array2<A>), E>>,
+        chunks: impl IntoIterator<Item = Result<(Array2<A>, Array<A, D>), E>>,
         parts: usize,
-    ) -> Result<Elm<A>, E> {
+    ) -> Result<Elm<A, D>, E> {
         if parts == 0 {
             let (name, value, expected) = ("parts", 0.0, "at least 1");
             return Err(E::from(Error::Parameter {

@@ -1,4 +1,4 @@
-//! Checks that new rows resemble those that the standardisation was measured on.
+//! Checks that new rows resemble those that the standardization was measured on.
 //!
 //! A scaler that was measured on too few rows, or on others, does harm without a trace in the fit: an
 //! input that was constant there is lost, and one that hardly varied is magnified until every neuron
@@ -7,6 +7,7 @@
 use ndarray::{ArrayView1, ArrayView2};
 
 use super::Accumulator;
+use crate::dataset::TargetDim;
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 
@@ -18,7 +19,7 @@ const ROWS_PER_FAR: u64 = 100;
 /// This many may be far off in any case: a few impossible values are not another distribution.
 const FAR_AT_LEAST: u64 = 10;
 
-impl<A: Scalar> Accumulator<A> {
+impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
     /// For each input the rows so far, with these, that are far off.
     ///
     /// # Errors

@@ -1,11 +1,14 @@
 //! The parts of a saved accumulator, before they are checked against each other.
 
+use std::marker::PhantomData;
+
 use ndarray::{Array1, Array2, Axis};
 use serde::Deserialize;
 
 use super::{Accumulator, BLOCK, OVERFLOW};
 use crate::bounds::Bounds;
 use crate::check::{check_length, check_matrix};
+use crate::dataset::{TargetDim, check_outputs};
 use crate::error::{Error, Result};
 use crate::feature_map::FeatureMap;
 use crate::scalar::Scalar;
@@ -32,10 +35,11 @@ pub(super) struct Parts<A: Scalar> {
     bounds: Option<Bounds<A>>,
 }
 
-impl<A: Scalar> TryFrom<Parts<A>> for Accumulator<A> {
+impl<A: Scalar, D: TargetDim> TryFrom<Parts<A>> for Accumulator<A, D> {
     type Error = Error;
 
     fn try_from(parts: Parts<A>) -> Result<Self> {
+        check_outputs::<D>(parts.outputs)?;
         check_length("inputs", parts.inputs, parts.map.inputs())?;
         parts.solver.check()?;
         if let Some(bounds) = &parts.bounds {
@@ -105,6 +109,7 @@ impl<A: Scalar> TryFrom<Parts<A>> for Accumulator<A> {
             pending,
             bounded,
             bounds,
+            dimension: PhantomData,
         })
     }
 }

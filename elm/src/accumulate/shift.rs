@@ -1,6 +1,6 @@
 //! The constants that are subtracted from columns before they enter the triangle.
 //!
-//! Centring a column by the column of ones costs as many digits as its mean has over its deviation.
+//! Centering a column by the column of ones costs as many digits as its mean has over its deviation.
 //! Columns are therefore taken less a value near their mean, which is known from the first rows. What
 //! that leaves of a constant is its rounding and no more, however many rows there are. Without an
 //! intercept there is no column of ones to put back what was taken off, and nothing is.
@@ -8,10 +8,11 @@
 use ndarray::{Array1, ArrayRef2, ArrayViewMut2, s};
 
 use super::Accumulator;
+use crate::dataset::TargetDim;
 use crate::scalar::Scalar;
 use crate::stats;
 
-impl<A: Scalar> Accumulator<A> {
+impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
     /// Takes what belongs to it off weighted rows, which are as they were pushed; the first rows say
     /// what that is.
     pub(super) fn take_off(&mut self, mut rows: ArrayViewMut2<'_, A>) {

@@ -3,13 +3,14 @@
 use ndarray::{Array1, ArrayView1, Axis, s};
 
 use super::Accumulator;
+use crate::dataset::TargetDim;
 use crate::error::Result;
 use crate::linalg::QrFactor;
 use crate::scalar::{Scalar, power_of_two};
 use crate::solve::design_svd::DesignSvd;
 use crate::solve::equilibration::Equilibration;
 
-impl<A: Scalar> Accumulator<A> {
+impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
     /// The problem in the coordinates of its singular vectors, as a batch fit has it.
     pub(super) fn spectrum(&self) -> Result<DesignSvd<A>> {
         let extra = usize::from(self.intercept);
@@ -45,7 +46,7 @@ impl<A: Scalar> Accumulator<A> {
                 let shift = self.shift.as_ref().map_or(A::zero(), |s| s[column - 1]);
                 shift + first[column] * relative(column)
             };
-            // What centring leaves of a constant is the rounding of its values, and would pass for a
+            // What centering leaves of a constant is the rounding of its values, and would pass for a
             // feature; it does not grow with the rows.
             let bound = A::from_f64(4.0) * A::epsilon();
             let is_constant = |column: usize| {

@@ -10,6 +10,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use ndarray::ArrayViewMut2;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::error::Error;
@@ -18,7 +19,7 @@ use crate::simd::Level;
 
 /// The function that a hidden neuron applies to its weighted sum $z = w \cdot x + b$.
 ///
-/// An enum rather than a type parameter: a fitted network keeps one type, serialises its
+/// An enum rather than a type parameter: a fitted network keeps one type, serializes its
 /// activation as a name, and can be chosen at run time. Your own function goes in through
 /// [`Activation::custom`].
 ///
@@ -40,8 +41,8 @@ use crate::simd::Level;
 /// let by_name: Activation<f64> = "sine".parse()?;
 /// let own = Activation::custom("cube", |z: f64| z * z * z);
 /// for activation in [by_name, own] {
-///     let model = ElmParams::new(10).activation(activation).fit(&x, &t)?;
-///     assert!((model.predict(&x)?[[4, 0]] - 8.0).abs() < 0.5);
+///     let model = ElmParams::new(10).with_activation(activation).fit(&x, &t)?;
+///     assert!((model.predict(&x)?[4] - 8.0).abs() < 0.5);
 /// }
 /// # Ok::<(), elm::Error>(())
 /// ```
@@ -270,6 +271,7 @@ impl<A: Scalar> FromStr for Activation<A> {
     }
 }
 
+#[cfg(feature = "serde")]
 impl<A: Scalar> Serialize for Activation<A> {
     /// By name; a custom function is code, which no file holds, and might have the name of another.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -283,6 +285,7 @@ impl<A: Scalar> Serialize for Activation<A> {
     }
 }
 
+#[cfg(feature = "serde")]
 impl<'de, A: Scalar> Deserialize<'de> for Activation<A> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         String::deserialize(deserializer)?

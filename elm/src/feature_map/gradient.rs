@@ -3,7 +3,7 @@
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
 
 use super::distance;
-use super::layer::{Group, HiddenLayer};
+use super::layer::{HiddenLayer, NeuronBlock};
 use crate::scalar::Scalar;
 
 /// The step that differences of activation functions are taken over, in units of what a step of one
@@ -42,7 +42,7 @@ fn root_mean_square<A: Scalar>(values: ArrayView1<'_, A>) -> A {
 }
 
 fn of_projections<A: Scalar>(
-    group: &Group<A>,
+    group: &NeuronBlock<A>,
     weights: ArrayView2<'_, A>,
     biases: ArrayView1<'_, A>,
     x: ArrayView2<'_, A>,
@@ -69,15 +69,15 @@ fn of_projections<A: Scalar>(
 /// With distance $z = \lVert s \circ x - c \rVert$ the slope along input $j$ is
 /// $f'(z) s_j (s_j x_j - c_j) / z$.
 fn of_distances<A: Scalar>(
-    group: &Group<A>,
-    centres: ArrayView2<'_, A>,
+    group: &NeuronBlock<A>,
+    centers: ArrayView2<'_, A>,
     scales: &Array1<A>,
     x: ArrayView2<'_, A>,
     beta: ArrayView1<'_, A>,
 ) -> Array2<A> {
     let step = A::from_f64(STEP) * root_mean_square(scales.view());
     let x = &x * scales;
-    let z = distance::distances(x.view(), centres);
+    let z = distance::distances(x.view(), centers);
     let mut slopes = &z + step;
     group.activation.apply_in_place(slopes.view_mut());
     let mut below = z.mapv(|z| (z - step).max(A::zero()));
@@ -88,7 +88,7 @@ fn of_distances<A: Scalar>(
             .and(z)
             .and(beta)
             .for_each(|slope, &z, &beta| {
-                // At its centre a neuron is level.
+                // At its center a neuron is level.
                 *slope = if z > A::zero() {
                     *slope * beta / ((step + step.min(z)) * z)
                 } else {
@@ -96,7 +96,7 @@ fn of_distances<A: Scalar>(
                 };
             });
     }
-    let mut gradient = A::product(slopes.view(), centres.t());
+    let mut gradient = A::product(slopes.view(), centers.t());
     let sums = slopes.sum_axis(Axis(1)).insert_axis(Axis(1));
     gradient.zip_mut_with(&(&x * &sums), |g, &own| *g = own - *g);
     gradient *= scales;

@@ -4,10 +4,11 @@
 //! That matrix is the paper's $F$; most of the literature, and this crate, call it $H$.
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut2, Axis, s};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use super::distance;
-use super::neurons::Kind;
+use super::neurons::NodeType;
 use crate::activation::Activation;
 use crate::check::{check_length, check_matrix};
 use crate::error::{Error, Result};
@@ -20,28 +21,30 @@ use crate::scalar::Scalar;
 /// several [`groups`](Self::groups) each group has random numbers of its own, those of its place
 /// among the groups, and the same holds group by group: 50 neurons of the second group are the
 /// beginning of its 100, whatever the sizes of the others.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct HiddenLayer<A: Scalar> {
     /// Shape (inputs, neurons).
     pub(super) weights: Array2<A>,
     /// Shape (neurons).
     pub(super) biases: Array1<A>,
     /// In the order of the neurons.
-    pub(super) groups: Vec<Group<A>>,
+    pub(super) groups: Vec<NeuronBlock<A>>,
 }
 
 /// Neurons of a layer that stand side by side and have one function.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
-pub struct Group<A: Scalar> {
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
+pub struct NeuronBlock<A: Scalar> {
     pub(super) neurons: usize,
     pub(super) activation: Activation<A>,
     /// What radial neurons multiply the inputs by.
     pub(super) radial: Option<Array1<A>>,
 }
 
-impl<A: Scalar> Group<A> {
+impl<A: Scalar> NeuronBlock<A> {
     /// Number of neurons.
     #[must_use]
     pub fn neurons(&self) -> usize {
@@ -56,10 +59,10 @@ impl<A: Scalar> Group<A> {
 
     /// What the function is applied to.
     #[must_use]
-    pub fn kind(&self) -> Kind {
+    pub fn node_type(&self) -> NodeType {
         match self.radial {
-            None => Kind::Projection,
-            Some(_) => Kind::Radial,
+            None => NodeType::Additive,
+            Some(_) => NodeType::Rbf,
         }
     }
 
@@ -93,7 +96,7 @@ impl<A: Scalar> HiddenLayer<A> {
 
     fn forward_group(
         &self,
-        group: &Group<A>,
+        group: &NeuronBlock<A>,
         first: usize,
         x: ArrayView2<'_, A>,
         mut to: ArrayViewMut2<'_, A>,
@@ -161,7 +164,7 @@ impl<A: Scalar> HiddenLayer<A> {
             first = own.end;
             let kept = neurons.iter().filter(|&k| own.contains(k)).count();
             if kept > 0 {
-                groups.push(Group {
+                groups.push(NeuronBlock {
                     neurons: kept,
                     ..group.clone()
                 });
@@ -178,7 +181,7 @@ impl<A: Scalar> HiddenLayer<A> {
     /// of its neurons, in which layer it was and its number there. The layers must have the same
     /// inputs.
     pub(crate) fn join(layers: &[&Self]) -> (Self, Vec<(usize, usize)>) {
-        let mut groups: Vec<Group<A>> = Vec::new();
+        let mut groups: Vec<NeuronBlock<A>> = Vec::new();
         // Of each of these groups where its neurons come from.
         let mut order: Vec<Vec<(usize, usize)>> = Vec::new();
         for (place, layer) in layers.iter().enumerate() {
@@ -186,7 +189,7 @@ impl<A: Scalar> HiddenLayer<A> {
             for group in &layer.groups {
                 let own = (first..first + group.neurons).map(|neuron| (place, neuron));
                 first += group.neurons;
-                let alike = |known: &Group<A>| {
+                let alike = |known: &NeuronBlock<A>| {
                     known.activation == group.activation && known.radial == group.radial
                 };
                 if let Some(known) = groups.iter().position(alike) {
@@ -248,8 +251,8 @@ impl<A: Scalar> HiddenLayer<A> {
         self.weights.ncols()
     }
 
-    /// The weights $\omega$, shape (inputs, neurons); of radial neurons the centres, in inputs that
-    /// are multiplied by the [scales](Group::input_scales) of their group.
+    /// The weights $\omega$, shape (inputs, neurons); of radial neurons the centers, in inputs that
+    /// are multiplied by the [scales](NeuronBlock::input_scales) of their group.
     #[must_use]
     pub fn weights(&self) -> ArrayView2<'_, A> {
         self.weights.view()
@@ -263,7 +266,7 @@ impl<A: Scalar> HiddenLayer<A> {
 
     /// The neurons by function, in the order of their weights.
     #[must_use]
-    pub fn groups(&self) -> &[Group<A>] {
+    pub fn groups(&self) -> &[NeuronBlock<A>] {
         &self.groups
     }
 }

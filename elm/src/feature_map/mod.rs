@@ -1,4 +1,4 @@
-//! The random feature map of an extreme learning machine: standardise, project, activate, and where
+//! The random feature map of an extreme learning machine: standardize, project, activate, and where
 //! wanted pass the inputs through.
 //!
 //! A network is a feature map and a linear readout. The map is drawn, never trained.
@@ -18,36 +18,40 @@ mod scaler;
 mod tests;
 
 use ndarray::{Array2, ArrayRef2, ArrayView1, ArrayView2, s};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::check::{check_length, check_matrix};
-use crate::error::{Error, Result};
+#[cfg(feature = "serde")]
+use crate::error::Error;
+use crate::error::Result;
 use crate::memory::check_room;
 use crate::scalar::Scalar;
 
 pub(crate) use kernels::{Accumulate, sum_of_line};
-pub use layer::{Group, HiddenLayer};
-pub use neurons::{Biases, Distribution, Kind, Neurons};
+pub use layer::{HiddenLayer, NeuronBlock};
+pub use neurons::{Biases, Distribution, NeuronGroup, NodeType};
 pub(crate) use packed::CHUNK_PANELS;
 pub(crate) use packed_map::{PackedMap, TILE_ROWS, TileBuffers, tile_rows};
 pub use params::FeatureMapParams;
 pub(crate) use rows::FeatureRows;
 pub use scaler::{Scaler, ScalerBuilder};
 
-/// From inputs to features: standardised by a [`Scaler`], through the neurons of a
-/// [`HiddenLayer`], and followed by the standardised inputs themselves where these are linked directly.
+/// From inputs to features: standardized by a [`Scaler`], through the neurons of a
+/// [`HiddenLayer`], and followed by the standardized inputs themselves where these are linked directly.
 ///
 /// ```
 /// use elm::ElmParams;
 /// use ndarray::{Array1, Axis};
 ///
 /// let x = Array1::linspace(-3.0, 3.0, 60).insert_axis(Axis(1));
-/// let map = ElmParams::new(20).direct_links(true).feature_map().draw_on(&x)?;
+/// let map = ElmParams::new(20).with_direct_links(true).feature_map().draw_on(&x)?;
 /// assert_eq!(map.transform(&x)?.dim(), (60, 21));
 /// # Ok::<(), elm::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "", try_from = "Parts<A>")]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "", try_from = "Parts<A>"))]
 pub struct FeatureMap<A: Scalar> {
     scaler: Option<Scaler<A>>,
     layer: HiddenLayer<A>,
@@ -55,6 +59,7 @@ pub struct FeatureMap<A: Scalar> {
 }
 
 /// A [`FeatureMap`] from outside, before its parts are known to fit together.
+#[cfg(feature = "serde")]
 #[derive(Deserialize)]
 #[serde(bound = "")]
 struct Parts<A: Scalar> {
@@ -63,6 +68,7 @@ struct Parts<A: Scalar> {
     direct_links: bool,
 }
 
+#[cfg(feature = "serde")]
 impl<A: Scalar> TryFrom<Parts<A>> for FeatureMap<A> {
     type Error = Error;
 
@@ -152,7 +158,7 @@ impl<A: Scalar> FeatureMap<A> {
         Self::of_checked(self.scaler.clone(), layer, self.direct_links)
     }
 
-    /// The slopes along the (standardised) inputs `x` of $\sum_j \beta_j \phi_j(x)$, shape (rows,
+    /// The slopes along the (standardized) inputs `x` of $\sum_j \beta_j \phi_j(x)$, shape (rows,
     /// inputs).
     pub(crate) fn gradient(&self, x: ArrayView2<'_, A>, beta: ArrayView1<'_, A>) -> Array2<A> {
         let (own, links) = beta.split_at(ndarray::Axis(0), self.layer.neurons());
@@ -175,7 +181,7 @@ impl<A: Scalar> FeatureMap<A> {
         self.layer.neurons() + if self.direct_links { self.inputs() } else { 0 }
     }
 
-    /// The standardisation of inputs, where it is on.
+    /// The standardization of inputs, where it is on.
     #[must_use]
     pub fn scaler(&self) -> Option<&Scaler<A>> {
         self.scaler.as_ref()
@@ -187,7 +193,7 @@ impl<A: Scalar> FeatureMap<A> {
         &self.layer
     }
 
-    /// Whether the standardised inputs follow the neurons.
+    /// Whether the standardized inputs follow the neurons.
     #[must_use]
     pub fn direct_links(&self) -> bool {
         self.direct_links

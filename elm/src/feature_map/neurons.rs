@@ -1,13 +1,15 @@
-//! Kinds of neurons, and what their weights are drawn from.
+//! Groups of neurons, and what their weights are drawn from.
 
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::activation::Activation;
 use crate::scalar::Scalar;
 
 /// The distribution that hidden weights and biases are drawn from, before scaling.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Distribution {
     /// Uniform on $[-1, 1)$, the usual choice of the ELM literature.
@@ -35,79 +37,89 @@ impl Distribution {
 }
 
 /// Where the biases of the random layer come from.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Biases {
     /// Drawn as the weights are, and multiplied by the same scale.
     #[default]
     AsWeights,
     /// Drawn as the weights are, and multiplied by a scale of their own.
-    Scaled(#[serde(serialize_with = "crate::numbers::finite")] f64),
+    Scaled(#[cfg_attr(feature = "serde", serde(serialize_with = "crate::numbers::finite"))] f64),
     /// Chosen so that each neuron's weighted sum is 0 at a training row drawn for it: the bend or
     /// bump of every neuron then lies where there are data, whatever the scale of the weights. Rows
     /// that have weights of their own are drawn in proportion to them.
-    OnData,
+    #[cfg_attr(feature = "serde", serde(alias = "on-data"))]
+    AtTrainingRows,
 }
 
 /// What a neuron's function is applied to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
-pub enum Kind {
+pub enum NodeType {
     /// A weighted sum of the inputs and a bias, $\omega_k \cdot x + b_k$: the neurons of equation 7.
     #[default]
-    Projection,
-    /// The distance $\lVert s \odot (x - c_k) \rVert$ from a centre, a training row drawn for the
-    /// neuron (no row twice until all are taken; in proportion to its weight), with each input
-    /// multiplied by the scale of the weights, $s$. With [`Activation::Gaussian`] this is a radial
-    /// basis function $e^{-\lVert s \odot (x - c_k) \rVert^2}$, whose width is the scale's inverse.
-    Radial,
+    #[cfg_attr(feature = "serde", serde(alias = "projection"))]
+    Additive,
+    /// The distance $\lVert s \odot (x - c_k) \rVert$ from a center, a training row drawn for the
+    /// neuron (no row twice until all are taken; in proportion to its weight), with each input multiplied by the scale of the
+    /// weights, $s$. With [`Activation::Gaussian`] this is a radial basis function
+    /// $e^{-\lVert s \odot (x - c_k) \rVert^2}$, whose width is the scale's inverse.
+    #[cfg_attr(feature = "serde", serde(alias = "radial"))]
+    Rbf,
 }
 
-/// Neurons of one kind, to stand in one layer with others: see
-/// [`ElmParams::and`](crate::ElmParams::and).
+/// A group of like neurons, to stand in one layer with others: see
+/// [`ElmParams::with_group`](crate::ElmParams::with_group).
 ///
 /// ```
-/// use elm::{Activation, Biases, ElmParams, Neurons};
+/// use elm::{Activation, Biases, ElmParams, NeuronGroup};
 /// use ndarray::{Array1, Axis};
 ///
 /// let x = Array1::linspace(-3.0, 3.0, 100).insert_axis(Axis(1));
 /// let params = ElmParams::new(20)
-///     .activation(Activation::Tanh)
-///     .and(Neurons::new(10, Activation::Sine).scale(3.0).biases(Biases::OnData))
-///     .and(Neurons::radial(10));
+///     .with_activation(Activation::Tanh)
+///     .with_group(NeuronGroup::new(10, Activation::Sine).with_scale(3.0).with_biases(Biases::AtTrainingRows))
+///     .with_group(NeuronGroup::rbf(10));
 /// let model = params.fit(&x, &x.mapv(|x: f64| x.abs()))?;
 /// assert_eq!(model.hidden().neurons(), 40);
 /// # Ok::<(), elm::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "", deny_unknown_fields)]
-pub struct Neurons<A: Scalar> {
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "", deny_unknown_fields))]
+pub struct NeuronGroup<A: Scalar> {
     pub(crate) count: usize,
-    #[serde(default)]
+    #[cfg_attr(feature = "serde", serde(default))]
     pub(crate) activation: Activation<A>,
-    #[serde(default)]
-    pub(crate) kind: Kind,
-    #[serde(default = "one", serialize_with = "crate::numbers::finite")]
+    #[cfg_attr(feature = "serde", serde(default, alias = "kind"))]
+    pub(crate) node_type: NodeType,
+    #[cfg_attr(
+        feature = "serde",
+        serde(default = "one", serialize_with = "crate::numbers::finite")
+    )]
     pub(crate) scale: f64,
-    #[serde(default)]
+    #[cfg_attr(feature = "serde", serde(default))]
     pub(crate) biases: Biases,
 }
 
 /// The scale of a file that does not say.
+#[cfg(feature = "serde")]
 fn one() -> f64 {
     1.0
 }
 
-impl<A: Scalar> Neurons<A> {
+impl<A: Scalar> NeuronGroup<A> {
     /// This many neurons of equation 7.
     #[must_use]
     pub fn new(count: usize, activation: Activation<A>) -> Self {
         Self {
             count,
             activation,
-            kind: Kind::Projection,
+            node_type: NodeType::Additive,
             scale: 1.0,
             biases: Biases::default(),
         }
@@ -115,37 +127,67 @@ impl<A: Scalar> Neurons<A> {
 
     /// This many Gaussian radial basis functions.
     #[must_use]
-    pub fn radial(count: usize) -> Self {
+    pub fn rbf(count: usize) -> Self {
         Self {
-            kind: Kind::Radial,
+            node_type: NodeType::Rbf,
             ..Self::new(count, Activation::Gaussian)
         }
     }
 
     /// What the function is applied to.
     #[must_use]
-    pub fn kind(mut self, kind: Kind) -> Self {
-        self.kind = kind;
+    pub fn with_node_type(mut self, node_type: NodeType) -> Self {
+        self.node_type = node_type;
         self
     }
 
-    /// Multiplies the weights on top of [`ElmParams::scale`](crate::ElmParams::scale): how many
+    /// Multiplies the weights on top of [`ElmParams::with_scale`](crate::ElmParams::with_scale): how many
     /// times the scale of the layer these neurons have. 1 unless set.
     #[must_use]
-    pub fn scale(mut self, scale: f64) -> Self {
+    pub fn with_scale(mut self, scale: f64) -> Self {
         self.scale = scale;
         self
     }
 
     /// Where the biases come from; radial neurons have none.
     #[must_use]
-    pub fn biases(mut self, biases: Biases) -> Self {
+    pub fn with_biases(mut self, biases: Biases) -> Self {
         self.biases = biases;
         self
     }
 
+    /// Number of neurons.
+    #[must_use]
+    pub fn neurons(&self) -> usize {
+        self.count
+    }
+
+    /// The activation function.
+    #[must_use]
+    pub fn activation(&self) -> &Activation<A> {
+        &self.activation
+    }
+
+    /// What the function is applied to.
+    #[must_use]
+    pub fn node_type(&self) -> NodeType {
+        self.node_type
+    }
+
+    /// What the weights are multiplied by on top of the scale of the layer.
+    #[must_use]
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    /// Where the biases come from.
+    #[must_use]
+    pub fn biases(&self) -> Biases {
+        self.biases
+    }
+
     /// Whether drawing takes more of the rows than the number of their inputs.
     pub(crate) fn need_rows(&self) -> bool {
-        self.kind == Kind::Radial || self.biases == Biases::OnData
+        self.node_type == NodeType::Rbf || self.biases == Biases::AtTrainingRows
     }
 }

@@ -2,7 +2,7 @@
 
 use ndarray::ArrayView2;
 
-use super::layer::{Group, HiddenLayer};
+use super::layer::{HiddenLayer, NeuronBlock};
 use crate::activation::Activation;
 use crate::scalar::Scalar;
 use crate::simd::{Aligned, zeros};
@@ -40,7 +40,7 @@ pub(crate) struct Packed<A: Scalar> {
 }
 
 impl<A: Scalar> Panels<A> {
-    fn new(group: &Group<A>, first: usize, count: usize) -> Self {
+    fn new(group: &NeuronBlock<A>, first: usize, count: usize) -> Self {
         Self {
             first,
             count,

@@ -28,7 +28,7 @@ pub(crate) struct PackedMap<A: Scalar> {
 /// Working memory for a tile of rows.
 #[derive(Debug, Clone)]
 pub(crate) struct TileBuffers<A: Scalar> {
-    /// Inputs, standardised, as [`Project`] wants them.
+    /// Inputs, standardized, as [`Project`] wants them.
     pub(crate) inputs: Aligned<A>,
     /// The same, multiplied by the scales of a group of radial neurons.
     scaled: Aligned<A>,
@@ -84,7 +84,7 @@ impl<A: Scalar> PackedMap<A> {
         }
     }
 
-    /// Standardises a tile of rows, and hands its hidden values to `take`, chunk by chunk. `offset` is
+    /// Standardizes a tile of rows, and hands its hidden values to `take`, chunk by chunk. `offset` is
     /// the number of the first row in messages.
     pub(crate) fn tile(
         &self,
@@ -95,7 +95,7 @@ impl<A: Scalar> PackedMap<A> {
     ) -> Result<()> {
         let (rows, packed) = (x.nrows(), &self.packed);
         let inputs = &mut buffers.inputs[..rows * packed.inputs];
-        self.standardise(x, inputs, offset)?;
+        self.standardize(x, inputs, offset)?;
         for group in &packed.groups {
             let inputs = match &group.radial {
                 None => &*inputs,
@@ -130,8 +130,8 @@ impl<A: Scalar> PackedMap<A> {
         Ok(())
     }
 
-    /// Copies a tile of inputs, standardised, into blocks of rows.
-    fn standardise(&self, x: ArrayView2<'_, A>, to: &mut [A], offset: usize) -> Result<()> {
+    /// Copies a tile of inputs, standardized, into blocks of rows.
+    fn standardize(&self, x: ArrayView2<'_, A>, to: &mut [A], offset: usize) -> Result<()> {
         let inputs = self.packed.inputs;
         let mut finite = true;
         for (first, rows) in row_blocks(x.nrows()) {

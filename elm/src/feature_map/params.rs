@@ -1,8 +1,9 @@
 //! The settings and the seed that a feature map is drawn from.
 
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use super::neurons::{Biases, Distribution, Neurons};
+use super::neurons::{Biases, Distribution, NeuronGroup};
 use crate::activation::Activation;
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
@@ -13,31 +14,34 @@ use crate::scalar::Scalar;
 /// Whoever keeps these settings, and the scaler of the training rows, need not keep the random weights.
 ///
 /// ```
-/// use elm::{ElmParams, FeatureMap, Scaler};
+/// use elm::advanced::FeatureMap;
+/// use elm::{ElmParams, Scaler};
 /// use ndarray::{Array1, Axis};
 ///
 /// let x = Array1::linspace(-3.0, 3.0, 60).insert_axis(Axis(1));
-/// let params = ElmParams::new(20).seed(7);
+/// let params = ElmParams::new(20).with_seed(7);
 /// let layer = params.feature_map().draw(1)?;
 /// let map = FeatureMap::new(Some(Scaler::measured(&x)?), layer, false)?;
 /// assert_eq!(map, params.feature_map().draw_on(&x)?);
 /// assert_eq!(map.transform(&x)?.dim(), (60, 20));
 /// # Ok::<(), elm::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct FeatureMapParams<A: Scalar> {
     /// The neurons that the setters of `ElmParams` describe.
-    pub(crate) neurons: Neurons<A>,
+    pub(crate) neurons: NeuronGroup<A>,
     /// Those of other kinds.
-    pub(crate) others: Vec<Neurons<A>>,
+    pub(crate) others: Vec<NeuronGroup<A>>,
     pub(crate) distribution: Distribution,
     /// Multiplies all weights.
     pub(crate) scale: f64,
     /// Multiplies the weights of each input; empty for 1.
     pub(crate) input_scales: Vec<f64>,
     pub(crate) seed: u64,
-    pub(crate) standardise: bool,
+    #[cfg_attr(feature = "serde", serde(alias = "standardise"))]
+    pub(crate) standardize: bool,
     pub(crate) direct_links: bool,
 }
 
@@ -45,35 +49,35 @@ impl<A: Scalar> FeatureMapParams<A> {
     /// The defaults, with this many neurons.
     pub(crate) fn new(neurons: usize) -> Self {
         Self {
-            neurons: Neurons::new(neurons, Activation::default()),
+            neurons: NeuronGroup::new(neurons, Activation::default()),
             others: Vec::new(),
             distribution: Distribution::default(),
             scale: 1.0,
             input_scales: Vec::new(),
             seed: 0,
-            standardise: true,
+            standardize: true,
             direct_links: false,
         }
     }
 
-    pub(crate) fn groups(&self) -> impl Iterator<Item = &Neurons<A>> {
+    pub(crate) fn groups(&self) -> impl Iterator<Item = &NeuronGroup<A>> {
         std::iter::once(&self.neurons).chain(&self.others)
     }
 
-    pub(crate) fn groups_mut(&mut self) -> impl Iterator<Item = &mut Neurons<A>> {
+    pub(crate) fn groups_mut(&mut self) -> impl Iterator<Item = &mut NeuronGroup<A>> {
         std::iter::once(&mut self.neurons).chain(&mut self.others)
     }
 
     /// Number of neurons, of all kinds together.
     #[must_use]
     pub fn neurons(&self) -> usize {
-        let add = |sum: usize, group: &Neurons<A>| sum.saturating_add(group.count);
+        let add = |sum: usize, group: &NeuronGroup<A>| sum.saturating_add(group.count);
         self.groups().fold(0, add)
     }
 
     /// Whether drawing takes more of the training rows than the number of their inputs.
     pub(crate) fn needs_rows(&self) -> bool {
-        self.groups().any(Neurons::need_rows)
+        self.groups().any(NeuronGroup::need_rows)
     }
 
     /// Checks the settings.

@@ -6,8 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{StandardNormal, StandardUniform};
 
 use super::FeatureMap;
-use super::layer::{Group, HiddenLayer};
-use super::neurons::{Biases, Distribution, Kind, Neurons};
+use super::layer::{HiddenLayer, NeuronBlock};
+use super::neurons::{Biases, Distribution, NeuronGroup, NodeType};
 use super::params::FeatureMapParams;
 use super::scaler::Scaler;
 use crate::check::{check_length, check_matrix};
@@ -17,7 +17,7 @@ use crate::scalar::Scalar;
 use crate::stats::Sum;
 use crate::stream::Stream;
 
-/// Training inputs, standardised where they are looked at: a layer is laid on few of many rows.
+/// Training inputs, standardized where they are looked at: a layer is laid on few of many rows.
 #[derive(Clone, Copy)]
 pub(crate) struct Inputs<'a, A: Scalar> {
     x: ArrayView2<'a, A>,
@@ -60,7 +60,7 @@ impl<A: Scalar> FeatureMapParams<A> {
     /// # Errors
     /// Those of [`check`](Self::check); [`Error::Empty`] without inputs, [`Error::Shape`] for another
     /// number of input scales, [`Error::TooLarge`]; [`Error::Conflict`] for neurons that are laid on
-    /// training rows ([`Biases::OnData`], [`Kind::Radial`]), as there are none.
+    /// training rows ([`Biases::AtTrainingRows`], [`NodeType::Rbf`]), as there are none.
     pub fn draw(&self, inputs: usize) -> Result<HiddenLayer<A>> {
         self.check()?;
         if self.needs_rows() {
@@ -90,12 +90,12 @@ impl<A: Scalar> FeatureMapParams<A> {
         x: ArrayView2<'_, A>,
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<FeatureMap<A>> {
-        let scaler = self.standardise.then(|| Scaler::measure(x, weights));
+        let scaler = self.standardize.then(|| Scaler::measure(x, weights));
         let layer = self.draw_layer(x, scaler.as_ref(), weights)?;
         Ok(FeatureMap::of_checked(scaler, layer, self.direct_links))
     }
 
-    /// The layer for these rows, standardised by `scaler`, of these positive weights.
+    /// The layer for these rows, standardized by `scaler`, of these positive weights.
     pub(crate) fn draw_layer(
         &self,
         x: ArrayView2<'_, A>,
@@ -111,7 +111,7 @@ impl<A: Scalar> FeatureMapParams<A> {
         Ok(self.sample(Inputs::new(x, scaler), weights))
     }
 
-    /// The layer for these (standardised) training rows with these positive weights.
+    /// The layer for these (standardized) training rows with these positive weights.
     pub(super) fn sample<'a>(
         &self,
         x: impl Into<Inputs<'a, A>>,
@@ -132,15 +132,15 @@ impl<A: Scalar> FeatureMapParams<A> {
             if columns.is_empty() {
                 continue;
             }
-            let (weights, biases, radial) = match group.kind {
-                Kind::Projection => {
+            let (weights, biases, radial) = match group.node_type {
+                NodeType::Additive => {
                     let (weights, biases) = self.projections(x, &places, group, index);
                     (weights, biases, None)
                 }
-                Kind::Radial => {
+                NodeType::Rbf => {
                     let mut random = Stream::Rows(index).of(self.seed);
-                    let (centres, scales) = self.centres(x, &places, group, &mut random);
-                    (centres, Array1::zeros(group.count), Some(scales))
+                    let (centers, scales) = self.centers(x, &places, group, &mut random);
+                    (centers, Array1::zeros(group.count), Some(scales))
                 }
             };
             layer
@@ -148,7 +148,7 @@ impl<A: Scalar> FeatureMapParams<A> {
                 .slice_mut(s![.., columns.clone()])
                 .assign(&weights);
             layer.biases.slice_mut(s![columns]).assign(&biases);
-            layer.groups.push(Group {
+            layer.groups.push(NeuronBlock {
                 neurons: group.count,
                 activation: group.activation.clone(),
                 radial,
@@ -165,7 +165,7 @@ impl<A: Scalar> FeatureMapParams<A> {
         &self,
         x: Inputs<'_, A>,
         places: &Places,
-        group: &Neurons<A>,
+        group: &NeuronGroup<A>,
         index: u32,
     ) -> (Array2<A>, Array1<A>) {
         let inputs = x.ncols();
@@ -196,7 +196,7 @@ impl<A: Scalar> FeatureMapParams<A> {
         let biases = match group.biases {
             Biases::AsWeights => drawn(scale),
             Biases::Scaled(scale) => drawn(scale),
-            Biases::OnData => {
+            Biases::AtTrainingRows => {
                 let mut random = Stream::Rows(index).of(self.seed);
                 let rows = weights
                     .columns()
@@ -208,23 +208,23 @@ impl<A: Scalar> FeatureMapParams<A> {
         (weights, biases)
     }
 
-    /// Centres in scaled inputs, shape (inputs, neurons), and the scale of each input.
-    fn centres(
+    /// Centers in scaled inputs, shape (inputs, neurons), and the scale of each input.
+    fn centers(
         &self,
         x: Inputs<'_, A>,
         places: &Places,
-        group: &Neurons<A>,
+        group: &NeuronGroup<A>,
         random: &mut ChaCha8Rng,
     ) -> (Array2<A>, Array1<A>) {
         let scales = Array1::from_shape_fn(x.ncols(), |input| {
             A::from_f64(self.scale * group.scale * self.input_scale(input))
         });
         let rows = places.without_repetition(group.count, random);
-        let mut centres = Array2::zeros((x.ncols(), group.count));
-        for (mut centre, row) in centres.columns_mut().into_iter().zip(rows) {
-            centre.assign(&(&x.row(row) * &scales));
+        let mut centers = Array2::zeros((x.ncols(), group.count));
+        for (mut center, row) in centers.columns_mut().into_iter().zip(rows) {
+            center.assign(&(&x.row(row) * &scales));
         }
-        (centres, scales)
+        (centers, scales)
     }
 }
 

@@ -1,8 +1,9 @@
-//! Standardisation of inputs: mean 0 and standard deviation 1 over the training rows.
+//! Standardization of inputs: mean 0 and standard deviation 1 over the training rows.
 
 use std::marker::PhantomData;
 
 use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2, Axis, Zip};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::check::{check_length, check_matrix, check_some_weight, check_weights};
@@ -34,8 +35,9 @@ use crate::stats::Moments;
 /// assert_eq!(scaler.factor(), array![4.5_f64.sqrt().recip(), 0.0, 0.25]);
 /// # Ok::<(), elm::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "", try_from = "Parts<A>")]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "", try_from = "Parts<A>"))]
 pub struct Scaler<A: Scalar> {
     mean: Array1<A>,
     /// 1 / standard deviation, or for two values 1 / their distance; 0 for a constant input.
@@ -43,6 +45,7 @@ pub struct Scaler<A: Scalar> {
 }
 
 /// A [`Scaler`] from outside, before it is known to make sense.
+#[cfg(feature = "serde")]
 #[derive(Deserialize)]
 #[serde(bound = "")]
 struct Parts<A: Scalar> {
@@ -50,6 +53,7 @@ struct Parts<A: Scalar> {
     factor: Array1<A>,
 }
 
+#[cfg(feature = "serde")]
 impl<A: Scalar> TryFrom<Parts<A>> for Scaler<A> {
     type Error = Error;
 
@@ -131,7 +135,7 @@ impl<A: Scalar> Scaler<A> {
         }
     }
 
-    /// The standardised inputs, shape (rows, inputs).
+    /// The standardized inputs, shape (rows, inputs).
     pub(crate) fn transform(&self, x: ArrayView2<'_, A>) -> Array2<A> {
         let mut out = x.to_owned();
         for mut row in out.rows_mut() {
@@ -149,7 +153,7 @@ impl<A: Scalar> Scaler<A> {
         out
     }
 
-    /// Standardises inputs in place, each a slice of its values.
+    /// Standardizes inputs in place, each a slice of its values.
     pub(crate) fn transform_columns<'a>(&self, columns: impl Iterator<Item = &'a mut [A]>) {
         for ((column, &mean), &factor) in columns.zip(&self.mean).zip(&self.factor) {
             if factor == A::zero() {
@@ -168,7 +172,7 @@ impl<A: Scalar> Scaler<A> {
         self.mean.view()
     }
 
-    /// What each centred input is multiplied by; 0 for an input that was constant.
+    /// What each centered input is multiplied by; 0 for an input that was constant.
     #[must_use]
     pub fn factor(&self) -> ArrayView1<'_, A> {
         self.factor.view()
@@ -203,20 +207,23 @@ fn reciprocal<A: Scalar>(deviation: f64) -> A {
 /// assert_eq!(one.build()?.mean(), Scaler::measured(&x)?.mean());
 /// # Ok::<(), elm::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "", try_from = "BuilderParts")]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "", try_from = "BuilderParts"))]
 pub struct ScalerBuilder<A: Scalar> {
     moments: Moments,
-    #[serde(skip)]
+    #[cfg_attr(feature = "serde", serde(skip))]
     scalar: PhantomData<A>,
 }
 
 /// A [`ScalerBuilder`] from outside, before it is known to make sense.
+#[cfg(feature = "serde")]
 #[derive(Deserialize)]
 struct BuilderParts {
     moments: Moments,
 }
 
+#[cfg(feature = "serde")]
 impl<A: Scalar> TryFrom<BuilderParts> for ScalerBuilder<A> {
     type Error = Error;
 
@@ -415,13 +422,16 @@ mod tests {
             .push_weighted(&array![[9.0, 9.0]], &array![0.0])
             .unwrap();
         assert_eq!(builder, before);
-        let text = serde_json::to_string(&builder).unwrap();
-        assert_eq!(
-            serde_json::from_str::<ScalerBuilder<f64>>(&text).unwrap(),
-            builder
-        );
-        let damaged = text.replace("\"unit\":4.0", "\"unit\":-4.0");
-        assert_ne!(damaged, text);
-        assert!(serde_json::from_str::<ScalerBuilder<f64>>(&damaged).is_err());
+        #[cfg(feature = "serde")]
+        {
+            let text = serde_json::to_string(&builder).unwrap();
+            assert_eq!(
+                serde_json::from_str::<ScalerBuilder<f64>>(&text).unwrap(),
+                builder
+            );
+            let damaged = text.replace("\"unit\":4.0", "\"unit\":-4.0");
+            assert_ne!(damaged, text);
+            assert!(serde_json::from_str::<ScalerBuilder<f64>>(&damaged).is_err());
+        }
     }
 }

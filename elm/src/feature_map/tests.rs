@@ -5,7 +5,7 @@ use crate::activation::Activation;
 
 fn plan<A: Scalar>(neurons: usize, seed: u64) -> FeatureMapParams<A> {
     FeatureMapParams {
-        neurons: Neurons::new(neurons, Activation::Tanh),
+        neurons: NeuronGroup::new(neurons, Activation::Tanh),
         seed,
         ..FeatureMapParams::new(0)
     }
@@ -42,12 +42,12 @@ fn a_small_layer_is_the_beginning_of_a_larger_one() {
 fn mixed<A: Scalar>(counts: [usize; 3], seed: u64) -> FeatureMapParams<A> {
     let [tanh, sine, radial] = counts;
     FeatureMapParams {
-        neurons: Neurons::new(tanh, Activation::Tanh),
+        neurons: NeuronGroup::new(tanh, Activation::Tanh),
         others: vec![
-            Neurons::new(sine, Activation::Sine)
-                .scale(2.0)
-                .biases(Biases::OnData),
-            Neurons::radial(radial).scale(0.5),
+            NeuronGroup::new(sine, Activation::Sine)
+                .with_scale(2.0)
+                .with_biases(Biases::AtTrainingRows),
+            NeuronGroup::rbf(radial).with_scale(0.5),
         ],
         scale: 0.8,
         input_scales: vec![1.0, 0.25],
@@ -73,7 +73,7 @@ fn in_a_mixed_layer_each_group_is_the_beginning_of_a_larger_one_whatever_the_oth
     }
     // The first group is a plain layer.
     let plain = FeatureMapParams {
-        neurons: Neurons::new(4, Activation::Tanh),
+        neurons: NeuronGroup::new(4, Activation::Tanh),
         others: Vec::new(),
         ..mixed::<f64>([0; 3], 5)
     };
@@ -84,10 +84,10 @@ fn in_a_mixed_layer_each_group_is_the_beginning_of_a_larger_one_whatever_the_oth
 }
 
 #[test]
-fn centres_are_scaled_rows_and_none_comes_twice_before_all_have_come_once() {
+fn centers_are_scaled_rows_and_none_comes_twice_before_all_have_come_once() {
     let x = rows();
     let plan = FeatureMapParams {
-        neurons: Neurons::radial(30).scale(3.0),
+        neurons: NeuronGroup::rbf(30).with_scale(3.0),
         scale: 0.5,
         input_scales: vec![1.0, 0.25],
         ..plan::<f64>(0, 2)
@@ -95,8 +95,8 @@ fn centres_are_scaled_rows_and_none_comes_twice_before_all_have_come_once() {
     let layer = plan.sample(x.view(), None);
     let scaled = &x * &array![1.5, 0.375];
     let mut uses = vec![0; x.nrows()];
-    for centre in layer.weights.columns() {
-        let row = scaled.rows().into_iter().position(|row| row == centre);
+    for center in layer.weights.columns() {
+        let row = scaled.rows().into_iter().position(|row| row == center);
         uses[row.unwrap()] += 1;
     }
     assert!(uses.iter().all(|&n| n == 2 || n == 3), "{uses:?}");
@@ -116,14 +116,14 @@ fn f32_is_the_rounded_f64_layer() {
         }
         let single = single.sample(x.mapv(|x| x as f32).view(), None);
         let double: HiddenLayer<f64> = double.sample(x.view(), None);
-        let (drawn, centres) = (s![.., ..5], s![.., 5..]);
+        let (drawn, centers) = (s![.., ..5], s![.., 5..]);
         let rounded = double.weights.mapv(|w| w as f32);
         assert_eq!(single.weights.slice(drawn), rounded.slice(drawn));
         assert_eq!(single.biases, double.biases.mapv(|b| b as f32));
         // Rounded as inputs, as scales and as their product.
         approx::assert_relative_eq!(
-            single.weights.slice(centres),
-            rounded.slice(centres),
+            single.weights.slice(centers),
+            rounded.slice(centers),
             max_relative = 2.0 * f32::EPSILON
         );
     }
@@ -133,7 +133,7 @@ fn f32_is_the_rounded_f64_layer() {
 fn biases_on_data_put_every_neuron_at_a_row() {
     let x = array![[0.5, -1.0], [3.0, 0.25], [-2.0, 8.0]];
     let plan = FeatureMapParams {
-        neurons: Neurons::new(20, Activation::Tanh).biases(Biases::OnData),
+        neurons: NeuronGroup::new(20, Activation::Tanh).with_biases(Biases::AtTrainingRows),
         scale: 50.0,
         ..plan(20, 4)
     };
@@ -206,7 +206,7 @@ fn a_distance_keeps_its_digits_far_from_the_origin() {
     // eighths. The product form would lose 1e12 of 1e16.
     let x = Array2::from_shape_fn((9, 3), |(i, j)| 1e6 + ((5 * i + 3 * j) % 11) as f64 / 8.0);
     let plan = FeatureMapParams {
-        neurons: Neurons::radial(9).kind(Kind::Radial),
+        neurons: NeuronGroup::rbf(9).with_node_type(NodeType::Rbf),
         ..plan::<f64>(0, 3)
     };
     let layer = plan.sample(x.view(), None);
@@ -250,13 +250,17 @@ fn gradients_are_those_of_the_weighted_sum() {
     // Central differences of squares are exact.
     let square = Activation::custom("square", |z: f64| z * z);
     let layer = FeatureMapParams {
-        neurons: Neurons::new(4, square.clone()),
-        others: vec![Neurons::new(5, square).kind(Kind::Radial).scale(0.3)],
+        neurons: NeuronGroup::new(4, square.clone()),
+        others: vec![
+            NeuronGroup::new(5, square)
+                .with_node_type(NodeType::Rbf)
+                .with_scale(0.3),
+        ],
         input_scales: vec![1.0, 0.25],
         ..plan(0, 5)
     }
     .sample(rows().view(), None);
-    // Away from the centres, which lie on rows.
+    // Away from the centers, which lie on rows.
     let x = rows() + 3.0;
     let beta = Array1::from_shape_fn(9, |k| (k as f64).cos());
     let gradient = layer.gradient(x.view(), beta.view());

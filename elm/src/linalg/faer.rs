@@ -27,7 +27,7 @@ use crate::simd::{Lanes, Level, Real};
 
 const PAR: Par = Par::Seq;
 
-/// A copy laid out by columns, as the factorisations want it.
+/// A copy laid out by columns, as the factorizations want it.
 fn by_columns<A: Copy + Zero>(a: ArrayView2<'_, A>) -> Array2<A> {
     let mut out = Array2::zeros(a.dim().f());
     out.assign(&a);
@@ -129,7 +129,7 @@ fn singular_values<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>) -> Result<A
     Ok(s)
 }
 
-fn triangularise<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
+fn triangularize<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
     a: ArrayView2<'_, A>,
     b: ArrayView2<'_, A>,
 ) -> QrFactor<A> {
@@ -140,7 +140,7 @@ fn triangularise<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
     let width = columns.max(b.ncols());
     let mut memory = MemBuffer::new(householder_scratch::<A>(rows, block, width));
     let stack = MemStack::new(&mut memory);
-    factorise(view_mut(&mut basis), view_mut(&mut factor), stack);
+    factorize(view_mut(&mut basis), view_mut(&mut factor), stack);
     let mut qtb = by_columns(b);
     apply_q_transpose(
         view(basis.view()),
@@ -170,7 +170,7 @@ fn triangularise<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
 /// $16 \epsilon$ times the rows, and its $R$ keeps that remainder: hundreds of times rounding
 /// error, in rows to which $Q^T B$ gives whole residuals. Here every column has its reflection, so
 /// that what a dependent column leaves in $R$ is rounding error.
-fn factorise<A: RealField>(mut a: MatMut<'_, A>, mut factor: MatMut<'_, A>, stack: &mut MemStack) {
+fn factorize<A: RealField>(mut a: MatMut<'_, A>, mut factor: MatMut<'_, A>, stack: &mut MemStack) {
     let (block, columns) = (factor.nrows(), a.ncols());
     for first in (0..columns).step_by(block) {
         let width = block.min(columns - first);
@@ -178,7 +178,7 @@ fn factorise<A: RealField>(mut a: MatMut<'_, A>, mut factor: MatMut<'_, A>, stac
         let (_, from_panel) = from_diagonal.split_at_col_mut(first);
         let (mut panel, rest) = from_panel.split_at_col_mut(width);
         let mut factor = factor.rb_mut().submatrix_mut(0, first, width, width);
-        factorise_panel(panel.rb_mut(), factor.rb_mut(), stack);
+        factorize_panel(panel.rb_mut(), factor.rb_mut(), stack);
         if rest.ncols() > 0 {
             apply_reflections(panel.rb(), factor.rb(), Conj::No, rest, PAR, stack);
         }
@@ -186,7 +186,7 @@ fn factorise<A: RealField>(mut a: MatMut<'_, A>, mut factor: MatMut<'_, A>, stac
 }
 
 /// One block of columns, the left half before the right one.
-fn factorise_panel<A: RealField>(
+fn factorize_panel<A: RealField>(
     mut a: MatMut<'_, A>,
     mut factor: MatMut<'_, A>,
     stack: &mut MemStack,
@@ -201,7 +201,7 @@ fn factorise_panel<A: RealField>(
     let half = width / 2;
     let (mut left, mut right) = a.rb_mut().split_at_col_mut(half);
     let (mut of_left, mut across, _, of_right) = factor.split_at_mut(half, half);
-    factorise_panel(left.rb_mut(), of_left.rb_mut(), stack);
+    factorize_panel(left.rb_mut(), of_left.rb_mut(), stack);
     apply_reflections(
         left.rb(),
         of_left.rb(),
@@ -211,7 +211,7 @@ fn factorise_panel<A: RealField>(
         stack,
     );
     let (_, mut right) = right.split_at_row_mut(half);
-    factorise_panel(right.rb_mut(), of_right, stack);
+    factorize_panel(right.rb_mut(), of_right, stack);
     // The products of the left reflections' vectors with those of the right ones, whose upper
     // part is a unit triangle that R has the place of.
     let (_, left) = left.rb().split_at_row(half);
@@ -448,11 +448,11 @@ macro_rules! kernel {
                 clean(singular_values(a))
             }
 
-            fn triangularise(
+            fn triangularize(
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
             ) -> Result<QrFactor<Self>, Failure> {
-                Ok(clean(triangularise(a, b)))
+                Ok(clean(triangularize(a, b)))
             }
 
             fn solve_upper(

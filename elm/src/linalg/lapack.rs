@@ -55,7 +55,7 @@ fn decompose<A: Lapack<Real = A>>(a: ArrayView2<'_, A>) -> Result<Svd<A>, Failur
     }
 }
 
-fn triangularise<A: Lapack<Real = A>>(
+fn triangularize<A: Lapack<Real = A>>(
     a: ArrayView2<'_, A>,
     b: ArrayView2<'_, A>,
 ) -> Result<QrFactor<A>, Failure> {
@@ -141,12 +141,12 @@ macro_rules! kernel {
                 Ok(by_rows(a).svddc_into(JobSvd::None).map_err(no_convergence)?.1)
             }
 
-            fn triangularise(
+            fn triangularize(
                 a: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,
             ) -> Result<QrFactor<Self>, Failure> {
                 sequential();
-                triangularise(a, b)
+                triangularize(a, b)
             }
 
             fn solve_upper(

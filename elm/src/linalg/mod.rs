@@ -82,7 +82,7 @@ pub trait Backend: Sized {
     fn singular_values(a: ArrayView2<'_, Self>) -> Result<Array1<Self>, Failure>;
 
     /// $A = QR$ for `a` with at least as many rows as columns, applied to `b`.
-    fn triangularise(
+    fn triangularize(
         a: ArrayView2<'_, Self>,
         b: ArrayView2<'_, Self>,
     ) -> Result<QrFactor<Self>, Failure>;
@@ -198,8 +198,8 @@ mod tests {
             let copy = part.to_owned().as_standard_layout().into_owned();
             assert_eq!(f64::svd(part).unwrap().s, f64::svd(copy.view()).unwrap().s);
             let right = whole.slice(ndarray::s![..part.nrows(), 7..8]);
-            let one = f64::triangularise(part, right).unwrap();
-            let other = f64::triangularise(copy.view(), right.to_owned().view()).unwrap();
+            let one = f64::triangularize(part, right).unwrap();
+            let other = f64::triangularize(copy.view(), right.to_owned().view()).unwrap();
             assert_eq!((one.r, one.qtb), (other.r, other.qtb));
             assert_eq!(
                 f64::solve_square(part, right).unwrap(),
@@ -215,14 +215,14 @@ mod tests {
     }
 
     #[test]
-    fn triangularise_keeps_norms_and_normal_equations() {
+    fn triangularize_keeps_norms_and_normal_equations() {
         for (rows, columns) in [(1, 1), (5, 5), (40, 7), (600, 60)] {
             let (a, b) = (random(rows, columns, 3), random(rows, 4, 4));
             let QrFactor {
                 r,
                 qtb,
                 residual_ss,
-            } = f64::triangularise(a.view(), b.view()).unwrap();
+            } = f64::triangularize(a.view(), b.view()).unwrap();
             for ((i, j), &value) in r.indexed_iter() {
                 assert!(i <= j || value == 0.0, "below the diagonal");
             }

@@ -1,46 +1,54 @@
-//! From settings to a fitted network: [`ElmParams`] to [`CheckedParams`] to [`Elm`].
+//! From settings to a fitted network: [`ElmParams`] to [`Elm`](crate::Elm).
 
-mod checked;
-mod rows;
+mod fit;
+#[cfg(feature = "serde")]
 mod settings;
-
-use ndarray::{ArrayBase, ArrayRef1, ArrayRef2, ArrayView2, Axis, Data, Ix1, Ix2};
 
 use crate::activation::Activation;
 use crate::error::Result;
-use crate::feature_map::{Biases, Distribution, FeatureMapParams, Kind, Neurons};
-use crate::network::Elm;
+use crate::feature_map::{Biases, Distribution, FeatureMapParams, NeuronGroup, NodeType};
 use crate::scalar::Scalar;
 use crate::solve::Solver;
-pub use checked::CheckedParams;
-pub(crate) use checked::Drawn;
-pub(crate) use rows::Rows;
+pub(crate) use fit::Drawn;
 
-/// Settings of an extreme learning machine. Setters never fail; [`check`](Self::check) and
-/// [`fit`](Self::fit) say what is out of range.
+/// Settings of an extreme learning machine, and the fits that are made with them. `with_NAME` writes a
+/// setting and never fails, `NAME` reads it; [`fit`](Self::fit) and all other verbs say what is out of
+/// range.
 ///
 /// # Parameters
 ///
 /// | name | default | purpose | range |
 /// |---|---|---|---|
-/// | `neurons` | (required) | size of the random layer | at least 1 |
-/// | [`activation`](Self::activation) | sigmoid | the function $f$ of equation 7 | |
-/// | [`kind`](Self::kind) | projection | what the function is applied to: a weighted sum or a distance | |
-/// | [`and`](Self::and) | none | neurons of other kinds beside these | scales positive |
-/// | [`distribution`](Self::distribution) | uniform | what weights and biases are drawn from | |
-/// | [`scale`](Self::scale) | 1 | multiplies the random weights: how nonlinear the network is, and its most influential setting | positive |
-/// | [`input_scales`](Self::input_scales) | none | multiply the weights of each input | one per input, not negative |
-/// | [`biases`](Self::biases) | drawn as the weights | where the biases come from | a scale must not be negative |
-/// | [`seed`](Self::seed) | 0 | which random layer | |
-/// | [`solver`](Self::solver) | ridge by leave-one-out | how output weights are found | |
-/// | [`intercept`](Self::intercept) | on, but off for `Inverse` | an unpenalised constant per output | |
-/// | [`standardise`](Self::standardise) | on | inputs to mean 0, deviation 1 over the training rows | |
-/// | [`direct_links`](Self::direct_links) | off | inputs also reach the outputs directly (RVFL) | |
-/// | [`bounded`](Self::bounded) | on | holds predictions outside the data to its [bounds](crate::bounds) | |
+/// | [`neurons`](Self::with_neurons) | (required) | size of the random layer | at least 1 |
+/// | [`activation`](Self::with_activation) | sigmoid | the function $f$ of equation 7 | |
+/// | [`node_type`](Self::with_node_type) | additive | what the function is applied to: a weighted sum or a distance | |
+/// | [`biases`](Self::with_biases) | drawn as the weights | where the biases come from | a scale must not be negative |
+/// | [`groups`](Self::with_group) | none | further groups of neurons beside these | scales positive |
+/// | [`distribution`](Self::with_distribution) | uniform | what weights and biases are drawn from | |
+/// | [`scale`](Self::with_scale) | 1 | multiplies the random weights: how nonlinear the network is, and its most influential setting | positive |
+/// | [`input_scales`](Self::with_input_scales) | none | multiply the weights of each input | one per input, not negative |
+/// | [`seed`](Self::with_seed) | 0 | which random layer | |
+/// | [`solver`](Self::with_solver) | ridge by leave-one-out | how output weights are found | |
+/// | [`intercept`](Self::with_intercept) | on, but off for `Inverse` | an unpenalized constant per output | |
+/// | [`standardize`](Self::with_standardize) | on | inputs to mean 0, deviation 1 over the training rows | |
+/// | [`direct_links`](Self::with_direct_links) | off | inputs also reach the outputs directly (RVFL) | |
+/// | [`bounded`](Self::with_bounded) | on | holds predictions outside the data to its [bounds](crate::bounds) | |
 ///
 /// # Example
 ///
-/// In JSON and the like settings have these names too, and those that are missing their defaults:
+/// ```
+/// use elm::ElmParams;
+/// use ndarray::{Array1, Axis};
+///
+/// let x = Array1::linspace(-3.0, 3.0, 200).insert_axis(Axis(1));
+/// let t = x.column(0).mapv(f64::sin);
+/// let model = ElmParams::new(30).with_seed(1).fit(&x, &t)?;
+/// let error = elm::metrics::rmse(&model.predict(&x)?, &t)?;
+/// assert!(error < 1e-3);
+/// # Ok::<(), elm::Error>(())
+/// ```
+///
+/// In JSON and the like settings have these names, too, and those that are missing their defaults:
 ///
 /// ```
 /// use elm::{Activation, ElmParams};
@@ -48,22 +56,10 @@ pub(crate) use rows::Rows;
 /// let text = r#"{ "neurons": 20, "activation": "tanh", "solver": "pseudo-inverse" }"#;
 /// let params: ElmParams<f64> = serde_json::from_str(text)?;
 /// let same = ElmParams::new(20)
-///     .activation(Activation::Tanh)
-///     .solver(elm::solve::PseudoInverse::default());
+///     .with_activation(Activation::Tanh)
+///     .with_solver(elm::solve::PseudoInverse::default());
 /// assert_eq!(params, same);
 /// # Ok::<(), serde_json::Error>(())
-/// ```
-///
-/// ```
-/// use elm::ElmParams;
-/// use ndarray::{Array1, Axis};
-///
-/// let x = Array1::linspace(-3.0, 3.0, 200).insert_axis(Axis(1));
-/// let t = x.mapv(f64::sin);
-/// let model = ElmParams::new(30).seed(1).fit(&x, &t)?;
-/// let error = elm::metrics::rmse(&model.predict(&x)?.column(0), &t.column(0))?;
-/// assert!(error < 1e-3);
-/// # Ok::<(), elm::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct ElmParams<A: Scalar> {
@@ -85,9 +81,11 @@ impl<A: Scalar> ElmParams<A> {
         }
     }
 
-    /// Another number of hidden neurons in all. Where there are several kinds, each keeps its share
+    /// Another number of hidden neurons in all. Where there are several groups, each keeps its share
     /// of them, to within one.
     #[must_use]
+    #[doc(alias = "n_hidden")]
+    #[doc(alias = "hidden_layer_sizes")]
     pub fn with_neurons(mut self, neurons: usize) -> Self {
         let before = self.neurons();
         let (mut counted, mut given) = (0.0, 0);
@@ -104,7 +102,7 @@ impl<A: Scalar> ElmParams<A> {
         self
     }
 
-    /// Number of neurons, of all kinds together.
+    /// Number of neurons, of all groups together.
     #[must_use]
     pub fn neurons(&self) -> usize {
         self.map.neurons()
@@ -116,101 +114,177 @@ impl<A: Scalar> ElmParams<A> {
         &self.map
     }
 
-    pub(crate) fn links_directly(&self) -> bool {
-        self.map.direct_links
-    }
-
-    pub(crate) fn get_seed(&self) -> u64 {
-        self.map.seed
-    }
-
     /// The activation function of the hidden neurons.
     #[must_use]
-    pub fn activation(mut self, activation: Activation<A>) -> Self {
+    #[doc(alias = "activation_func")]
+    pub fn with_activation(mut self, activation: Activation<A>) -> Self {
         self.map.neurons.activation = activation;
         self
     }
 
+    /// The activation function of the hidden neurons (of the first group).
+    #[must_use]
+    pub fn activation(&self) -> &Activation<A> {
+        self.map.neurons.activation()
+    }
+
     /// What the activation function is applied to.
     #[must_use]
-    pub fn kind(mut self, kind: Kind) -> Self {
-        self.map.neurons.kind = kind;
+    pub fn with_node_type(mut self, node_type: NodeType) -> Self {
+        self.map.neurons.node_type = node_type;
         self
     }
 
-    /// Adds neurons of another kind to the layer. Everything but what [`Neurons`] sets they have in
-    /// common with the others: the distribution, the [`scale`](Self::scale), which theirs multiplies,
-    /// the [`input_scales`](Self::input_scales) and the seed.
+    /// What the activation function is applied to (in the first group).
     #[must_use]
-    pub fn and(mut self, neurons: Neurons<A>) -> Self {
+    pub fn node_type(&self) -> NodeType {
+        self.map.neurons.node_type()
+    }
+
+    /// Where the random biases come from.
+    #[must_use]
+    pub fn with_biases(mut self, biases: Biases) -> Self {
+        self.map.neurons.biases = biases;
+        self
+    }
+
+    /// Where the random biases come from (in the first group).
+    #[must_use]
+    pub fn biases(&self) -> Biases {
+        self.map.neurons.biases()
+    }
+
+    /// Adds a group of other neurons to the layer. Everything but what [`NeuronGroup`] sets they have in
+    /// common with the first: the distribution, the [`scale`](Self::with_scale), which theirs multiplies,
+    /// the [`input_scales`](Self::with_input_scales) and the seed.
+    #[must_use]
+    pub fn with_group(mut self, neurons: NeuronGroup<A>) -> Self {
         self.map.others.push(neurons);
+        self
+    }
+
+    /// The groups of neurons: the one that is set here, and those that were
+    /// [added](Self::with_group).
+    pub fn groups(&self) -> impl Iterator<Item = &NeuronGroup<A>> {
+        self.map.groups()
+    }
+
+    /// The distribution of hidden weights and biases.
+    #[must_use]
+    pub fn with_distribution(mut self, distribution: Distribution) -> Self {
+        self.map.distribution = distribution;
         self
     }
 
     /// The distribution of hidden weights and biases.
     #[must_use]
-    pub fn distribution(mut self, distribution: Distribution) -> Self {
-        self.map.distribution = distribution;
-        self
+    pub fn distribution(&self) -> Distribution {
+        self.map.distribution
     }
 
     /// Multiplies the random weights.
     #[must_use]
-    pub fn scale(mut self, scale: f64) -> Self {
+    #[doc(alias = "gamma")]
+    #[doc(alias = "rbf_width")]
+    pub fn with_scale(mut self, scale: f64) -> Self {
         self.map.scale = scale;
         self
     }
 
-    /// Multiplies the weights of each input on top of [`scale`](Self::scale): 0 for an input that
+    /// What the random weights are multiplied by.
+    #[must_use]
+    pub fn scale(&self) -> f64 {
+        self.map.scale
+    }
+
+    /// Multiplies the weights of each input on top of [`scale`](Self::with_scale): 0 for an input that
     /// is to be ignored. Empty, the default, means 1 for all.
     #[must_use]
-    pub fn input_scales(mut self, input_scales: Vec<f64>) -> Self {
+    pub fn with_input_scales(mut self, input_scales: Vec<f64>) -> Self {
         self.map.input_scales = input_scales;
         self
     }
 
-    /// Where the random biases come from.
+    /// What the weights of each input are multiplied by; empty for 1.
     #[must_use]
-    pub fn biases(mut self, biases: Biases) -> Self {
-        self.map.neurons.biases = biases;
+    pub fn input_scales(&self) -> &[f64] {
+        &self.map.input_scales
+    }
+
+    /// Seeds the random layer. One seed gives one layer, on every platform. 0 unless set.
+    #[must_use]
+    #[doc(alias = "random_state")]
+    pub fn with_seed(mut self, seed: u64) -> Self {
+        self.map.seed = seed;
         self
     }
 
-    /// Seeds the random layer. One seed gives one layer, on every platform.
+    /// The seed of the random layer.
     #[must_use]
-    pub fn seed(mut self, seed: u64) -> Self {
-        self.map.seed = seed;
-        self
+    pub fn seed(&self) -> u64 {
+        self.map.seed
     }
 
     /// How the output weights are found: [`Inverse`](crate::solve::Inverse),
     /// [`PseudoInverse`](crate::solve::PseudoInverse) or [`Ridge`](crate::solve::Ridge).
     #[must_use]
-    pub fn solver(mut self, solver: impl Into<Solver>) -> Self {
+    #[doc(alias = "alpha")]
+    #[doc(alias = "regressor")]
+    pub fn with_solver(mut self, solver: impl Into<Solver>) -> Self {
         self.solver = solver.into();
         self
     }
 
-    /// Whether each output has a constant that is not penalised.
+    /// How the output weights are found.
     #[must_use]
-    pub fn intercept(mut self, intercept: bool) -> Self {
+    pub fn solver(&self) -> Solver {
+        self.solver
+    }
+
+    /// Whether each output has a constant that is not penalized.
+    #[must_use]
+    #[doc(alias = "fit_intercept")]
+    pub fn with_intercept(mut self, intercept: bool) -> Self {
         self.intercept = Some(intercept);
+        self
+    }
+
+    /// Whether each output has a constant that is not penalized; unless that is set, with every solver
+    /// but [`Inverse`](crate::solve::Inverse).
+    #[must_use]
+    pub fn intercept(&self) -> bool {
+        // Equation 10 has no room for a constant; asking for both explicitly is an error later.
+        let inverse = matches!(self.solver, Solver::Inverse(_));
+        self.intercept.unwrap_or(!inverse)
+    }
+
+    /// Whether inputs are brought to mean 0 and standard deviation 1 first.
+    #[must_use]
+    #[doc(alias = "StandardScaler")]
+    pub fn with_standardize(mut self, standardize: bool) -> Self {
+        self.map.standardize = standardize;
         self
     }
 
     /// Whether inputs are brought to mean 0 and standard deviation 1 first.
     #[must_use]
-    pub fn standardise(mut self, standardise: bool) -> Self {
-        self.map.standardise = standardise;
+    pub fn standardize(&self) -> bool {
+        self.map.standardize
+    }
+
+    /// Whether the (standardized) inputs stand beside the hidden neurons in the linear solve: a
+    /// random vector functional link network (Pao, Park and Sobajic, 1994).
+    #[must_use]
+    #[doc(alias = "RVFL")]
+    pub fn with_direct_links(mut self, direct_links: bool) -> Self {
+        self.map.direct_links = direct_links;
         self
     }
 
-    /// Whether the (standardised) inputs stand beside the hidden neurons in the linear solve: a
-    /// random vector functional link network (Pao, Park and Sobajic, 1994).
+    /// Whether the inputs stand beside the hidden neurons in the linear solve.
     #[must_use]
-    pub fn direct_links(mut self, direct_links: bool) -> Self {
-        self.map.direct_links = direct_links;
-        self
+    pub fn direct_links(&self) -> bool {
+        self.map.direct_links
     }
 
     /// Whether inputs beyond those of the training rows are held at the edge of their range, and
@@ -218,56 +292,23 @@ impl<A: Scalar> ElmParams<A> {
     /// [`bounds`](crate::bounds). Off, a prediction outside the data is whatever the sum of the
     /// neurons comes to there.
     #[must_use]
-    pub fn bounded(mut self, bounded: bool) -> Self {
+    pub fn with_bounded(mut self, bounded: bool) -> Self {
         self.bounded = bounded;
         self
     }
 
-    /// Checks the settings.
+    /// Whether predictions outside the training rows are held to their [bounds](crate::bounds).
+    #[must_use]
+    pub fn bounded(&self) -> bool {
+        self.bounded
+    }
+
+    /// Checks the settings. Every fit does so first.
     ///
     /// # Errors
     /// [`Error::Parameter`](crate::Error::Parameter) naming the first setting that is out of range.
-    pub fn check(self) -> Result<CheckedParams<A>> {
+    pub fn check(&self) -> Result<()> {
         self.map.check()?;
-        self.solver.check()?;
-        Ok(CheckedParams(self))
-    }
-
-    /// Checks the settings and fits; see [`CheckedParams::fit`].
-    ///
-    /// # Errors
-    /// Those of [`check`](Self::check) and [`CheckedParams::fit`].
-    pub fn fit<T: Targets<A>>(&self, x: &ArrayRef2<A>, t: &T) -> Result<Elm<A>> {
-        self.clone().check()?.fit(x, t)
-    }
-}
-
-/// Training targets: a matrix of shape (rows, outputs), or a vector for a single output.
-pub trait Targets<A: Scalar> {
-    /// The targets with shape (rows, outputs).
-    fn as_matrix(&self) -> ArrayView2<'_, A>;
-}
-
-impl<A: Scalar> Targets<A> for ArrayRef2<A> {
-    fn as_matrix(&self) -> ArrayView2<'_, A> {
-        self.view()
-    }
-}
-
-impl<A: Scalar> Targets<A> for ArrayRef1<A> {
-    fn as_matrix(&self) -> ArrayView2<'_, A> {
-        self.view().insert_axis(Axis(1))
-    }
-}
-
-impl<A: Scalar, S: Data<Elem = A>> Targets<A> for ArrayBase<S, Ix2> {
-    fn as_matrix(&self) -> ArrayView2<'_, A> {
-        self.view()
-    }
-}
-
-impl<A: Scalar, S: Data<Elem = A>> Targets<A> for ArrayBase<S, Ix1> {
-    fn as_matrix(&self) -> ArrayView2<'_, A> {
-        self.view().insert_axis(Axis(1))
+        self.solver.check()
     }
 }

@@ -12,7 +12,7 @@ use std::marker::PhantomData;
 use super::ElmParams;
 use crate::activation::Activation;
 use crate::error::Error;
-use crate::feature_map::{Biases, Distribution, FeatureMapParams, Kind, Neurons};
+use crate::feature_map::{Biases, Distribution, FeatureMapParams, NeuronGroup, NodeType};
 use crate::scalar::Scalar;
 use crate::solve::Solver;
 
@@ -33,12 +33,17 @@ struct Named<A: Scalar> {
     neurons: Count<A>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     activation: Option<Activation<A>>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    kind: Option<Kind>,
+    #[serde(default, alias = "kind", skip_serializing_if = "Option::is_none")]
+    node_type: Option<NodeType>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     biases: Option<Biases>,
-    #[serde(default, alias = "others", skip_serializing_if = "Vec::is_empty")]
-    and: Vec<Neurons<A>>,
+    #[serde(
+        default,
+        alias = "and",
+        alias = "others",
+        skip_serializing_if = "Vec::is_empty"
+    )]
+    groups: Vec<NeuronGroup<A>>,
     #[serde(default)]
     distribution: Distribution,
     #[serde(default = "one")]
@@ -51,8 +56,8 @@ struct Named<A: Scalar> {
     solver: Solver,
     #[serde(default)]
     intercept: Option<bool>,
-    #[serde(default = "yes")]
-    standardise: bool,
+    #[serde(default = "yes", alias = "standardise")]
+    standardize: bool,
     #[serde(default)]
     direct_links: bool,
     #[serde(default = "yes")]
@@ -70,7 +75,7 @@ fn yes() -> bool {
 /// The number of neurons or, as in older files, all settings of the neurons.
 enum Count<A: Scalar> {
     Number(usize),
-    Neurons(Neurons<A>),
+    Neurons(NeuronGroup<A>),
 }
 
 impl<A: Scalar> Serialize for Count<A> {
@@ -103,7 +108,7 @@ impl<'de, A: Scalar> Deserialize<'de> for Count<A> {
             }
 
             fn visit_map<M: MapAccess<'de>>(self, map: M) -> Result<Self::Value, M::Error> {
-                let neurons = Neurons::deserialize(MapAccessDeserializer::new(map))?;
+                let neurons = NeuronGroup::deserialize(MapAccessDeserializer::new(map))?;
                 Ok(Count::Neurons(neurons))
             }
         }
@@ -114,7 +119,7 @@ impl<'de, A: Scalar> Deserialize<'de> for Count<A> {
 impl<A: Scalar> Serialize for ElmParams<A> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         // JSON would make null of it, and nothing could be read from that.
-        if let Err(error @ Error::Parameter { value, .. }) = self.clone().check()
+        if let Err(error @ Error::Parameter { value, .. }) = self.check()
             && !value.is_finite()
         {
             return Err(S::Error::custom(error));
@@ -127,21 +132,21 @@ impl<A: Scalar> Serialize for ElmParams<A> {
         let plain = neurons.scale == 1.0;
         let named = Named {
             activation: plain.then(|| neurons.activation.clone()),
-            kind: plain.then_some(neurons.kind),
+            node_type: plain.then_some(neurons.node_type),
             biases: plain.then_some(neurons.biases),
             neurons: if plain {
                 Count::Number(neurons.count)
             } else {
                 Count::Neurons(neurons)
             },
-            and: own.map.others,
+            groups: own.map.others,
             distribution: own.map.distribution,
             scale: own.map.scale,
             input_scales: own.map.input_scales,
             seed: own.map.seed,
             solver: own.solver,
             intercept: own.intercept,
-            standardise: own.map.standardise,
+            standardize: own.map.standardize,
             direct_links: own.map.direct_links,
             bounded: own.bounded,
         };
@@ -162,14 +167,14 @@ impl<'de, A: Scalar> Deserialize<'de> for ElmParams<A> {
 impl<A: Scalar> From<Named<A>> for ElmParams<A> {
     fn from(named: Named<A>) -> Self {
         let mut neurons = match named.neurons {
-            Count::Number(count) => Neurons::new(count, Activation::default()),
+            Count::Number(count) => NeuronGroup::new(count, Activation::default()),
             Count::Neurons(neurons) => neurons,
         };
         if let Some(activation) = named.activation {
             neurons.activation = activation;
         }
-        if let Some(kind) = named.kind {
-            neurons.kind = kind;
+        if let Some(node_type) = named.node_type {
+            neurons.node_type = node_type;
         }
         if let Some(biases) = named.biases {
             neurons.biases = biases;
@@ -177,12 +182,12 @@ impl<A: Scalar> From<Named<A>> for ElmParams<A> {
         Self {
             map: FeatureMapParams {
                 neurons,
-                others: named.and,
+                others: named.groups,
                 distribution: named.distribution,
                 scale: named.scale,
                 input_scales: named.input_scales,
                 seed: named.seed,
-                standardise: named.standardise,
+                standardize: named.standardize,
                 direct_links: named.direct_links,
             },
             solver: named.solver,

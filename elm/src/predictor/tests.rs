@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use super::*;
 use crate::activation::Activation;
 use crate::simd::Level;
-use crate::{Biases, ElmParams, Kind, Neurons};
+use crate::{Biases, ElmParams, NeuronGroup, NodeType};
 
 /// Uniform on [-2, 2).
 fn inputs(rows: usize, columns: usize, seed: u64) -> Array2<f64> {
@@ -32,7 +32,7 @@ fn targets(rows: usize, outputs: usize) -> Array2<f64> {
 fn model(params: &ElmParams<f64>, inputs_count: usize, outputs: usize) -> Elm<f64> {
     let x = inputs(40, inputs_count, 1);
     let fitted = params.fit(&x, &targets(40, outputs)).unwrap();
-    fitted.bounded(false)
+    fitted.with_bounded(false)
 }
 
 /// The plain formula, equation 7, by ndarray and the standard library; and the sum of the
@@ -50,11 +50,11 @@ fn plain(model: &Elm<f64>, x: &Array2<f64>) -> (Array2<f64>, Array2<f64>) {
     for group in hidden.groups() {
         for k in neuron..neuron + group.neurons() {
             if let Some(scales) = group.input_scales() {
-                let (scaled, centre) = (&x * &scales, hidden.weights().column(k).to_owned());
+                let (scaled, center) = (&x * &scales, hidden.weights().column(k).to_owned());
                 for (i, row) in scaled.rows().into_iter().enumerate() {
-                    let apart = &row - &centre;
+                    let apart = &row - &center;
                     z[[i, k]] = apart.dot(&apart).sqrt();
-                    // Inputs and centres are rounded before their difference.
+                    // Inputs and centers are rounded before their difference.
                     z_size[[i, k]] = z[[i, k]] + row.dot(&row).sqrt();
                 }
             }
@@ -98,16 +98,16 @@ fn assert_is_plain(model: &Elm<f64>, x: &Array2<f64>, out: &Array2<f64>) {
 fn every_activation_with_links_and_intercept_is_the_plain_formula_on_every_level() {
     let own = Activation::custom("reciprocal", |z: f64| 1.0 / (1e-9 + z).abs().max(1.0));
     for activation in Activation::BUILT_IN.into_iter().chain([own]) {
-        for (links, intercept, standardise) in [
+        for (links, intercept, standardize) in [
             (false, true, true),
             (true, true, false),
             (true, false, true),
         ] {
             let params = ElmParams::new(21)
-                .activation(activation.clone())
-                .direct_links(links)
-                .intercept(intercept)
-                .standardise(standardise);
+                .with_activation(activation.clone())
+                .with_direct_links(links)
+                .with_intercept(intercept)
+                .with_standardize(standardize);
             let model = model(&params, 5, 2);
             let x = inputs(37, 5, 2);
             for level in Level::all() {
@@ -122,12 +122,14 @@ fn every_activation_with_links_and_intercept_is_the_plain_formula_on_every_level
 fn mixed(counts: [usize; 3]) -> ElmParams<f64> {
     let own = Activation::custom("reciprocal", |z: f64| 1.0 / (1e-9 + z).abs().max(1.0));
     ElmParams::new(counts[0])
-        .activation(Activation::Tanh)
-        .and(Neurons::new(counts[1], Activation::Sine).biases(Biases::OnData))
-        .and(Neurons::radial(counts[2]).scale(0.5))
-        .and(Neurons::new(3, own.clone()))
-        .and(Neurons::new(5, own).kind(Kind::Radial))
-        .and(Neurons::radial(9).scale(0.7))
+        .with_activation(Activation::Tanh)
+        .with_group(
+            NeuronGroup::new(counts[1], Activation::Sine).with_biases(Biases::AtTrainingRows),
+        )
+        .with_group(NeuronGroup::rbf(counts[2]).with_scale(0.5))
+        .with_group(NeuronGroup::new(3, own.clone()))
+        .with_group(NeuronGroup::new(5, own).with_node_type(NodeType::Rbf))
+        .with_group(NeuronGroup::rbf(9).with_scale(0.7))
 }
 
 #[test]
@@ -137,7 +139,7 @@ fn mixed_layers_are_the_plain_formula_on_every_level_alone_and_in_batches() {
         ([1, 1, 1], false),
         ([0, 150, 170], true),
     ] {
-        let model = model(&mixed(counts).direct_links(links), 5, 2);
+        let model = model(&mixed(counts).with_direct_links(links), 5, 2);
         let x = inputs(37, 5, 2);
         for level in Level::all() {
             let predictor = model.predictor().level(level);
@@ -162,10 +164,10 @@ proptest! {
         seed: u64,
     ) {
         let params = ElmParams::new(neurons)
-            .activation(Activation::Tanh)
-            .direct_links(links)
-            .solver(crate::solve::PseudoInverse::default())
-            .seed(seed);
+            .with_activation(Activation::Tanh)
+            .with_direct_links(links)
+            .with_solver(crate::solve::PseudoInverse::default())
+            .with_seed(seed);
         let model = model(&params, columns, outputs);
         let x = inputs(rows, columns, seed);
         for level in Level::all() {
@@ -178,7 +180,7 @@ proptest! {
 
 #[test]
 fn a_row_has_the_same_bits_alone_and_in_batches_of_any_size() {
-    let model = model(&ElmParams::new(150).direct_links(true), 3, 4);
+    let model = model(&ElmParams::new(150).with_direct_links(true), 3, 4);
     let x = inputs(2 * TILE_ROWS + 3, 3, 5);
     for level in Level::all() {
         let predictor = model.predictor().level(level);
@@ -249,12 +251,12 @@ fn strides_of_inputs_and_predictions_change_nothing() {
 
 #[test]
 fn single_precision_is_double_precision_rounded_at_every_step() {
-    let double = model(&ElmParams::new(100).activation(Activation::Tanh), 4, 2);
+    let double = model(&ElmParams::new(100).with_activation(Activation::Tanh), 4, 2);
     let x = inputs(50, 4, 8);
     let t = targets(40, 2).mapv(|t| t as f32);
     let single = ElmParams::new(100)
-        .activation(Activation::Tanh)
-        .bounded(false)
+        .with_activation(Activation::Tanh)
+        .with_bounded(false)
         .fit(&inputs(40, 4, 1).mapv(|x| x as f32), &t)
         .unwrap();
     // The same weights in double precision: beta differs between the fits, so take it over.
@@ -292,12 +294,12 @@ fn fast_predictions_differ_by_at_most_the_stated_error_times_the_output_weights(
         Activation::Sine,
         Activation::Gaussian,
     ] {
-        let model = model(&ElmParams::new(64).activation(activation), 4, 2);
+        let model = model(&ElmParams::new(64).with_activation(activation), 4, 2);
         let x = inputs(50, 4, 8);
         let full = model.predictor().predict(&x).unwrap();
         let fast = model
             .predictor()
-            .accuracy(Accuracy::Fast)
+            .with_accuracy(Accuracy::Fast)
             .predict(&x)
             .unwrap();
         let bound = model.beta().mapv(f64::abs).sum_axis(Axis(0)) * 6e-7;
@@ -316,7 +318,7 @@ fn a_large_mean_with_a_small_deviation_keeps_its_digits() {
     let offset = 67_108_864.0;
     let k = Array1::linspace(0.0, 63.0, 64).insert_axis(Axis(1));
     let t = k.mapv(|k: f64| (k / 10.0).sin());
-    let params = ElmParams::new(20).activation(Activation::Tanh);
+    let params = ElmParams::new(20).with_activation(Activation::Tanh);
     let near = params.fit(&k.mapv(|k| k / 8.0), &t).unwrap();
     let far = params.fit(&k.mapv(|k| offset + k / 8.0), &t).unwrap();
     let difference = near.predict(&k.mapv(|k| k / 8.0)).unwrap()
@@ -369,7 +371,7 @@ fn wrong_sizes_and_values_are_named() {
 
 #[test]
 fn a_prediction_beyond_the_range_of_the_type_is_an_overflow() {
-    let params = ElmParams::new(4).activation(Activation::Linear);
+    let params = ElmParams::new(4).with_activation(Activation::Linear);
     let model = model(&params, 2, 1);
     let x = Array2::from_elem((20, 2), f64::MAX);
     assert_eq!(

@@ -1,84 +1,53 @@
 //! Fits of pruned networks.
 
-use ndarray::{ArrayRef2, ArrayView1, Axis};
+use ndarray::Axis;
 
 use super::{Keep, Pruned, choose};
 use crate::bounds::Bounds;
+use crate::dataset::{Dataset, Rows, TargetDim};
 use crate::error::{Error, Result};
 use crate::feature_map::FeatureMap;
-use crate::model::{CheckedParams, Drawn, ElmParams, Rows, Targets};
+use crate::model::{Drawn, ElmParams};
 use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::solve::{LeastSquares, Ridge, Solver};
 
 impl<A: Scalar> ElmParams<A> {
     /// Draws the layer, keeps the neurons that are most useful together, and fits them; see
-    /// [`prune`](crate::prune).
-    ///
-    /// # Errors
-    /// Those of [`check`](Self::check) and [`CheckedParams::fit_pruned`].
-    pub fn fit_pruned<T: Targets<A>>(
-        &self,
-        x: &ArrayRef2<A>,
-        t: &T,
-        keep: Keep,
-    ) -> Result<Pruned<A>> {
-        self.clone().check()?.fit_pruned(x, t, keep)
-    }
-}
-
-impl<A: Scalar> CheckedParams<A> {
-    /// Draws the layer, keeps the neurons that are most useful together, and fits them; see
-    /// [`prune`](crate::prune). Direct links are kept.
+    /// [`prune`](crate::prune). Direct links are kept. Weights of rows count in what is useful, too.
     ///
     /// # Errors
     /// [`Error::Parameter`] for more neurons than there are, none, or a loss that is negative or
-    /// not finite; [`Error::Conflict`] unless the solver is ridge; those of [`fit`](Self::fit).
-    pub fn fit_pruned<T: Targets<A>>(
+    /// not finite; [`Error::Conflict`] unless the solver is ridge; those of
+    /// [`fit_dataset`](Self::fit_dataset).
+    pub fn fit_pruned<D: TargetDim>(
         &self,
-        x: &ArrayRef2<A>,
-        t: &T,
+        data: &Dataset<'_, A, D>,
         keep: Keep,
-    ) -> Result<Pruned<A>> {
-        self.fit_pruned_weighted(x, t, keep, None)
-    }
-
-    /// As [`fit_pruned`](Self::fit_pruned), with a weight for the squared residual of each row, which
-    /// decides what is useful as well, and counts in all else as in
-    /// [`fit_weighted`](Self::fit_weighted).
-    ///
-    /// # Errors
-    /// Those of [`fit_pruned`](Self::fit_pruned) and [`LeastSquares::weights`].
-    pub fn fit_pruned_weighted<T: Targets<A>>(
-        &self,
-        x: &ArrayRef2<A>,
-        t: &T,
-        keep: Keep,
-        weights: Option<ArrayView1<'_, A>>,
-    ) -> Result<Pruned<A>> {
+    ) -> Result<Pruned<A, D>> {
+        self.check()?;
         let ridge = self.pruning_ridge()?;
-        keep.check(self.params().neurons())?;
-        let rows = Rows::new(x.view(), t.as_matrix(), weights)?;
+        keep.check(self.neurons())?;
+        let rows = Rows::new(data)?;
         let drawn = self.draw(&rows)?;
         self.prune(drawn, &rows, keep, ridge)
     }
 
-    /// As [`fit_pruned_weighted`](Self::fit_pruned_weighted), of a feature map that is there already: see
+    /// As [`fit_pruned`](Self::fit_pruned), of a feature map that is there already: see
     /// [`fit_map`](Self::fit_map).
     ///
     /// # Errors
     /// Those of [`fit_pruned`](Self::fit_pruned) and [`fit_map`](Self::fit_map).
-    pub fn prune_map<T: Targets<A>>(
+    pub fn prune_map<D: TargetDim>(
         &self,
         map: FeatureMap<A>,
-        x: &ArrayRef2<A>,
-        t: &T,
+        data: &Dataset<'_, A, D>,
         keep: Keep,
-        weights: Option<ArrayView1<'_, A>>,
-    ) -> Result<Pruned<A>> {
+    ) -> Result<Pruned<A, D>> {
+        self.check()?;
         let ridge = self.pruning_ridge()?;
         keep.check(map.layer().neurons())?;
-        let rows = Self::rows_of_map(&map, x.view(), t.as_matrix(), weights)?;
+        let rows = Self::rows_of_map(&map, data)?;
         let design = Self::design(rows.x(), &map)?;
         self.prune(Drawn { map, design }, &rows, keep, ridge)
     }
@@ -93,13 +62,13 @@ impl<A: Scalar> CheckedParams<A> {
         }
     }
 
-    fn prune(
+    fn prune<D: TargetDim>(
         &self,
         drawn: Drawn<A>,
         rows: &Rows<'_, A>,
         keep: Keep,
         ridge: Ridge,
-    ) -> Result<Pruned<A>> {
+    ) -> Result<Pruned<A, D>> {
         let (t, weights) = (rows.t(), rows.weights());
         let Drawn { map, design } = drawn;
         let neurons = map.layer().neurons();
@@ -107,9 +76,9 @@ impl<A: Scalar> CheckedParams<A> {
         let wide_weights = weights.map(A::widen);
         let mut problem = LeastSquares::of_views(wide.0.view(), wide.1.view())?;
         if let Some(weights) = &wide_weights {
-            problem = problem.weights(weights)?;
+            problem = problem.with_weights(weights)?;
         }
-        let problem = problem.intercept(self.has_intercept());
+        let problem = problem.with_intercept(self.intercept());
         let (mut kept, path) = choose(&problem, neurons, ridge, keep)?;
         kept.sort_unstable();
 
@@ -126,7 +95,7 @@ impl<A: Scalar> CheckedParams<A> {
             model: Elm::assemble(
                 map.select(&kept),
                 solution,
-                Bounds::of(rows.x(), t, weights, self.is_bounded()),
+                Bounds::of(rows.x(), t, weights, self.bounded()),
             ),
             kept,
             path,

@@ -1,4 +1,4 @@
-//! Constants of the vectorised activation functions. Polynomials are minimax: their largest error
+//! Constants of the vectorized activation functions. Polynomials are minimax: their largest error
 //! over the interval is the smallest possible (Remez's exchange algorithm in 60 digits).
 
 use super::real::Real;

@@ -25,7 +25,7 @@ pub struct Cholesky<A: Scalar> {
 }
 
 impl<A: Scalar> Cholesky<A> {
-    /// Factorises a symmetric matrix, of which only what is on and below the diagonal is read. A matrix
+    /// Factorizes a symmetric matrix, of which only what is on and below the diagonal is read. A matrix
     /// that lies by columns is overwritten, any other copied.
     ///
     /// # Errors

@@ -1,7 +1,7 @@
 //! A least-squares problem in the coordinates of its singular vectors, which is where every
 //! solver but [`Inverse`](super::Inverse) works.
 //!
-//! With $\tilde H = U \operatorname{diag}(s) V^T$ (rows weighted, columns centred for the
+//! With $\tilde H = U \operatorname{diag}(s) V^T$ (rows weighted, columns centered for the
 //! intercept, everything scaled by powers of two into the middle of the floating-point range) and
 //! $C = U^T \tilde T$, a solver is a choice of what each direction keeps: $\beta = V
 //! \operatorname{diag}(g) C$ with $g_j = s_j / (s_j^2 + \lambda)$ for ridge, and $1 / s_j$ or 0
@@ -9,7 +9,7 @@
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
 
-use super::equilibration::{Equilibration, Prepared};
+use super::equilibration::{EquilibratedProblem, Equilibration};
 use super::norms::{norm, rounding};
 use super::{Diagnosis, LeastSquares, Reason, Route, Solution};
 use crate::error::Result;
@@ -28,7 +28,7 @@ pub(crate) struct DesignSvd<A: Scalar> {
     pub(crate) c: Array2<A>,
     /// For each output the sum of squares of $\tilde T$ that no singular vector reaches.
     pub(crate) residual_ss: Array1<A>,
-    /// The sum of squares of each column as predictions see it: scaled but not centred.
+    /// The sum of squares of each column as predictions see it: scaled but not centered.
     pub(crate) lengths: Array1<A>,
     pub(crate) frame: Equilibration<A>,
 }
@@ -44,40 +44,40 @@ pub(crate) struct DesignSvdWithRows<A: Scalar> {
     /// Share of each row's leverage that lies outside the span of $U$ and the intercept:
     /// $1 - w_i / \sum w - \sum_j U_{ij}^2$, exactly 0 where they span everything (1 for a row of
     /// weight 0).
-    pub(crate) free: Array1<A>,
+    pub(crate) one_minus_leverage: Array1<A>,
     /// The unit vector of the intercept; 0 without one.
     pub(crate) constant: Array1<A>,
 }
 
 impl<A: Scalar> DesignSvd<A> {
-    /// Factorises without keeping the rows.
+    /// Factorizes without keeping the rows.
     pub(crate) fn new(problem: &LeastSquares<'_, A>) -> Result<Self> {
-        Self::from_prepared(Prepared::new(problem))
+        Self::from_prepared(EquilibratedProblem::new(problem))
     }
 
     /// As [`new`](Self::new), for a problem that is prepared already.
-    pub(crate) fn from_prepared(prepared: Prepared<A>) -> Result<Self> {
-        let Prepared {
+    pub(crate) fn from_prepared(prepared: EquilibratedProblem<A>) -> Result<Self> {
+        let EquilibratedProblem {
             hidden,
             targets,
             frame,
         } = prepared;
         if Self::goes_by_triangle(hidden.view()) {
-            let triangle = A::triangularise(hidden.view(), targets.view())?;
+            let triangle = A::triangularize(hidden.view(), targets.view())?;
             return Self::of_triangle(triangle, frame);
         }
         let none = Array1::zeros(targets.ncols());
         Self::decompose(Route::Svd, hidden.view(), targets, none, frame)
     }
 
-    /// Whether a matrix is triangularised before its singular values are taken. Below twice as many
+    /// Whether a matrix is triangularized before its singular values are taken. Below twice as many
     /// rows as columns that costs more than it saves, and what it leaves in directions that are not
     /// there is no longer small beside [`rounding`].
     pub(crate) fn goes_by_triangle(hidden: ArrayView2<'_, A>) -> bool {
         hidden.nrows() >= 2 * hidden.ncols()
     }
 
-    /// For a problem that a QR factorisation has reduced to its triangle.
+    /// For a problem that a QR factorization has reduced to its triangle.
     pub(crate) fn of_triangle(triangle: QrFactor<A>, frame: Equilibration<A>) -> Result<Self> {
         let QrFactor {
             r,
@@ -145,7 +145,7 @@ impl<A: Scalar> DesignSvd<A> {
         let outputs = self.c.ncols();
         let beta = self
             .frame
-            .restore(A::product(self.vt.t(), (gain * &self.c).view()));
+            .unscale(A::product(self.vt.t(), (gain * &self.c).view()));
         let intercept = self.frame.constant(&beta);
 
         // The share of each direction that the fit keeps.
@@ -162,7 +162,7 @@ impl<A: Scalar> DesignSvd<A> {
         let singular_value = |i: usize| {
             self.s
                 .get(i)
-                .map_or(0.0, |&s| self.frame.outer_singular_value(s))
+                .map_or(0.0, |&s| self.frame.singular_value_in_original_units(s))
         };
         let (largest, smallest) = (singular_value(0), singular_value(rank.max(1) - 1));
         let diagnosis = Diagnosis {
@@ -176,7 +176,7 @@ impl<A: Scalar> DesignSvd<A> {
             degrees_of_freedom: (0..outputs)
                 .map(|o| kept(o).sum().as_f64() + constant)
                 .collect(),
-            residual_norm: self.frame.outer_residual_norms(residual_norms),
+            residual_norm: self.frame.residual_norms_in_original_units(residual_norms),
             beta_norm: beta.columns().into_iter().map(norm).collect(),
             leave_one_out,
         };
@@ -266,13 +266,13 @@ impl<A: Scalar> DesignSvd<A> {
 }
 
 impl<A: Scalar> DesignSvdWithRows<A> {
-    /// Factorises and keeps the rows.
+    /// Factorizes and keeps the rows.
     pub(crate) fn new(problem: &LeastSquares<'_, A>) -> Result<Self> {
-        let Prepared {
+        let EquilibratedProblem {
             hidden,
             targets,
             frame,
-        } = Prepared::new(problem);
+        } = EquilibratedProblem::new(problem);
         let constant = frame.constant_direction();
         // A row of weight 0 has no residual, which must not be divided by 0.
         let absent = |root: A| {
@@ -286,7 +286,7 @@ impl<A: Scalar> DesignSvdWithRows<A> {
         Self::of_rows(hidden, targets, constant, absent, frame)
     }
 
-    /// Of rows that are weighted and centred, with the unit vector of the intercept among them (0
+    /// Of rows that are weighted and centered, with the unit vector of the intercept among them (0
     /// without one) and a 1 for those that are absent. There may be fewer than the frame's, which
     /// others stand for.
     pub(crate) fn of_rows(
@@ -301,7 +301,7 @@ impl<A: Scalar> DesignSvdWithRows<A> {
         let c = A::product(u.t(), targets.view());
         let spanned = frame.spanned_by(u.ncols());
         let mut rows = Self {
-            free: absent,
+            one_minus_leverage: absent,
             residual: Array2::zeros(targets.dim()),
             spectrum: DesignSvd {
                 route: Route::Svd,
@@ -337,18 +337,20 @@ impl<A: Scalar> DesignSvdWithRows<A> {
         columns
     }
 
-    /// Fills [`free`](Self::free), and mends [`residual`](Self::residual) where it is small
+    /// Fills [`one_minus_leverage`](Self::one_minus_leverage), and mends [`residual`](Self::residual) where it is small
     /// because the row determines its own fit.
     fn measure_freedom(&mut self) {
         let u = &self.u;
-        self.free = Array1::from_shape_fn(u.nrows(), |i| {
+        self.one_minus_leverage = Array1::from_shape_fn(u.nrows(), |i| {
             A::one() - self.constant[i].powi(2) - u.row(i).dot(&u.row(i))
         });
         // The subtraction above has an error of epsilon. Where its result is small, take the
         // squared norm of the part of the row's unit vector that is left over instead: its error
         // is epsilon times its root. There are at most about `neurons` such rows.
         let coarse = A::epsilon().sqrt().sqrt();
-        let close: Vec<usize> = (0..u.nrows()).filter(|&i| self.free[i] < coarse).collect();
+        let close: Vec<usize> = (0..u.nrows())
+            .filter(|&i| self.one_minus_leverage[i] < coarse)
+            .collect();
         let noise = self.spectrum.level();
         for block in close.chunks(64) {
             let mut units = Array2::zeros((u.nrows(), block.len()));
@@ -361,10 +363,10 @@ impl<A: Scalar> DesignSvdWithRows<A> {
                 let own = left.column(column);
                 let own = own.dot(&own);
                 if own.sqrt() <= noise {
-                    self.free[row] = A::zero();
+                    self.one_minus_leverage[row] = A::zero();
                     self.residual.row_mut(row).fill(A::zero());
                 } else {
-                    self.free[row] = own;
+                    self.one_minus_leverage[row] = own;
                     self.residual.row_mut(row).assign(&mended.row(column));
                 }
             }

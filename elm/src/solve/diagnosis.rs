@@ -1,6 +1,7 @@
 //! What a solver reports beside the weights: rank, condition, route.
 
 use ndarray::ArrayView2;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use super::norms::norm;
@@ -9,8 +10,9 @@ use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 
 /// How a solver came to its answer; [`Reason`] says why so.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Route {
     /// LU with partial pivoting.
@@ -34,8 +36,9 @@ pub enum Route {
 
 /// Why a solver took its [`Route`]. Between the two forms of a route the shape of the matrix
 /// decides.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Reason {
     /// Equation 10 is the solution of a square system.
@@ -44,7 +47,8 @@ pub enum Reason {
     RankDecision,
     /// All strengths are tried, and leave-one-out scored, in the coordinates of the singular
     /// vectors.
-    StrengthSearch,
+    #[cfg_attr(feature = "serde", serde(alias = "strength-search"))]
+    LambdaSearch,
     /// The given strength bounds the condition of the normal equations: weights have relative
     /// errors below 1e-8 (`f64`) or 1e-3 (`f32`) by the fast route.
     StrongRidge,
@@ -55,15 +59,15 @@ pub enum Reason {
     Mean,
     /// Nothing was solved: the weights come from elsewhere.
     GivenWeights,
-    /// The triangle of the QR factorisation is far from losing a direction, so that the
+    /// The triangle of the QR factorization is far from losing a direction, so that the
     /// pseudo-inverse is the plain least-squares solution.
     FullRank,
 }
 
 /// The state of the problem that was solved, for the user to judge the answer by.
 ///
-/// Singular values are those of the matrix that was factorised: the hidden-layer matrix with rows
-/// weighted and, when there is an intercept, columns centred. Vectors have one entry per output.
+/// Singular values are those of the matrix that was factorized: the hidden-layer matrix with rows
+/// weighted and, when there is an intercept, columns centered. Vectors have one entry per output.
 /// What would overflow (the norm of residuals near the end of the range) is the largest number.
 ///
 /// ```
@@ -80,7 +84,8 @@ pub enum Reason {
 /// assert!((0.05..0.1).contains(&error[0]));
 /// # Ok::<(), elm::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[non_exhaustive]
 pub struct Diagnosis {
     /// The way the answer was computed.
@@ -93,11 +98,11 @@ pub struct Diagnosis {
     /// Largest over smallest singular value counted in [`rank`](Self::rank), 1 at rank 0; `None`
     /// with it.
     pub condition: Option<f64>,
-    /// The largest singular value; 0 where nothing was factorised.
+    /// The largest singular value; 0 where nothing was factorized.
     pub largest_singular_value: f64,
     /// The smallest singular value counted in [`rank`](Self::rank); `None` with it.
     pub smallest_singular_value: Option<f64>,
-    /// The regularisation relative to the largest squared singular value; 0 without one.
+    /// The regularization relative to the largest squared singular value; 0 without one.
     pub lambda: Vec<f64>,
     /// Effective degrees of freedom, the trace of the matrix that maps targets to fitted values.
     pub degrees_of_freedom: Vec<f64>,

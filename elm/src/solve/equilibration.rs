@@ -1,4 +1,4 @@
-//! Scales a problem before it is factorised, and unscales its solution.
+//! Scales a problem before it is factorized, and unscales its solution.
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip};
 
@@ -76,16 +76,16 @@ impl<A: Scalar> Equilibration<A> {
     }
 
     /// Output weights of the scaled problem in the problem's own units.
-    pub(crate) fn restore(&self, mut beta: Array2<A>) -> Array2<A> {
+    pub(crate) fn unscale(&self, mut beta: Array2<A>) -> Array2<A> {
         for (mut column, &scale) in beta.columns_mut().into_iter().zip(&self.target_scale) {
             column.mapv_inplace(|b| b * (scale / self.hidden_scale));
         }
         beta
     }
 
-    /// The sum of squares of each column of the scaled matrix before it was centred.
-    pub(crate) fn lengths(&self, centred: ArrayView2<'_, A>) -> Array1<A> {
-        let spread = centred.map_axis(Axis(0), |column| column.dot(&column));
+    /// The sum of squares of each column of the scaled matrix before it was centered.
+    pub(crate) fn lengths(&self, centered: ArrayView2<'_, A>) -> Array1<A> {
+        let spread = centered.map_axis(Axis(0), |column| column.dot(&column));
         let mean = self.hidden_mean.mapv(|m| m / self.hidden_scale);
         spread + mean.mapv_into(|m| m * m * self.total_weight)
     }
@@ -96,12 +96,15 @@ impl<A: Scalar> Equilibration<A> {
     }
 
     /// A singular value in the problem's own units.
-    pub(crate) fn outer_singular_value(&self, s: A) -> f64 {
+    pub(crate) fn singular_value_in_original_units(&self, s: A) -> f64 {
         s.as_f64() * (self.hidden_scale.as_f64() * self.weight_scale.as_f64().sqrt())
     }
 
     /// Norms of (weighted) residuals in the problem's own units.
-    pub(crate) fn outer_residual_norms(&self, norms: impl Iterator<Item = f64>) -> Vec<f64> {
+    pub(crate) fn residual_norms_in_original_units(
+        &self,
+        norms: impl Iterator<Item = f64>,
+    ) -> Vec<f64> {
         let root_weight = self.weight_scale.as_f64().sqrt();
         norms
             .zip(&self.target_scale)
@@ -117,15 +120,15 @@ impl<A: Scalar> Equilibration<A> {
     }
 }
 
-/// The problem with rows weighted, columns centred for the intercept, and everything scaled by
+/// The problem with rows weighted, columns centered for the intercept, and everything scaled by
 /// powers of two into the middle of the floating-point range. Rows of weight 0 are 0.
-pub(crate) struct Prepared<A: Scalar> {
+pub(crate) struct EquilibratedProblem<A: Scalar> {
     pub(crate) hidden: Array2<A>,
     pub(crate) targets: Array2<A>,
     pub(crate) frame: Equilibration<A>,
 }
 
-impl<A: Scalar> Prepared<A> {
+impl<A: Scalar> EquilibratedProblem<A> {
     pub(crate) fn new(problem: &LeastSquares<'_, A>) -> Self {
         let rows = problem.rows();
         let frame = Equilibration::of_weights(rows, problem.weights.as_ref(), problem.intercept);
@@ -148,9 +151,9 @@ impl<A: Scalar> Prepared<A> {
         let mut hidden_mean = Array1::zeros(hidden.ncols());
         let mut target_mean = Array1::zeros(targets.ncols());
         if problem.intercept {
-            hidden_mean = centre(&mut hidden, &weights);
+            hidden_mean = center(&mut hidden, &weights);
             hidden_mean.mapv_inplace(|m| m * hidden_scale);
-            target_mean = centre(&mut targets, &weights);
+            target_mean = center(&mut targets, &weights);
             target_mean *= &target_scale;
         }
         if problem.weights.is_some() {
@@ -225,7 +228,7 @@ pub(crate) fn weighted_magnitudes<A: Scalar>(
 /// Subtracts each column's weighted mean and returns the means. A column whose values differ by
 /// no more than rounding becomes exactly 0: its noise would pass for a feature. (These values are
 /// computed, and rounded as they are; how many there are does not matter.)
-fn centre<A: Scalar>(matrix: &mut Array2<A>, weights: &Array1<A>) -> Array1<A> {
+fn center<A: Scalar>(matrix: &mut Array2<A>, weights: &Array1<A>) -> Array1<A> {
     // Weights lie in [0, 1], so this is 1 for every row that is there.
     let largest = weighted_magnitudes(matrix.view(), &weights.mapv(A::ceil));
     let mut mean = vec![0.0; matrix.ncols()];

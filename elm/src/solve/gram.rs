@@ -14,7 +14,7 @@ use ndarray::{Array1, Array2};
 
 use super::Solution;
 use super::diagnosis::{Diagnosis, Reason, Route};
-use super::equilibration::{Equilibration, Prepared};
+use super::equilibration::{EquilibratedProblem, Equilibration};
 use super::lanczos::largest_eigenvalue;
 use super::normal_equations::{NormalEquations, RowSource};
 use super::norms::norm;
@@ -41,7 +41,7 @@ pub(super) fn allowed<A: Scalar>(lambda: f64) -> bool {
 
 /// The ridge solution of a problem with at least as many rows as neurons, whose hidden-layer
 /// matrix need never be there as a whole; or nothing where its numbers are beyond this route: out
-/// of range, all zeros, or with means so far from those of some rows that centring would cost digits.
+/// of range, all zeros, or with means so far from those of some rows that centering would cost digits.
 ///
 /// # Errors
 /// Those of making the rows.
@@ -98,8 +98,11 @@ pub(super) fn solve_rows<A: Scalar>(
 }
 
 /// The ridge solution, or nothing where the matrix turns out to be beyond this route (all zeros).
-pub(super) fn solve<A: Scalar>(prepared: &Prepared<A>, lambda: f64) -> Option<Solution<A>> {
-    let Prepared {
+pub(super) fn solve<A: Scalar>(
+    prepared: &EquilibratedProblem<A>,
+    lambda: f64,
+) -> Option<Solution<A>> {
+    let EquilibratedProblem {
         hidden,
         targets,
         frame,
@@ -153,7 +156,7 @@ impl<A: Scalar> Found<A> {
     /// In the problem's own units; `norms` are those of the residuals.
     fn solution(self, frame: &Equilibration<A>, norms: impl Iterator<Item = f64>) -> Solution<A> {
         let outputs = self.beta.ncols();
-        let beta = frame.restore(self.beta);
+        let beta = frame.unscale(self.beta);
         let intercept = frame.constant(&beta);
         let constant = f64::from(u8::from(frame.intercept));
         let diagnosis = Diagnosis {
@@ -161,11 +164,11 @@ impl<A: Scalar> Found<A> {
             reason: Reason::StrongRidge,
             rank: None,
             condition: None,
-            largest_singular_value: frame.outer_singular_value(self.largest),
+            largest_singular_value: frame.singular_value_in_original_units(self.largest),
             smallest_singular_value: None,
             lambda: vec![self.lambda; outputs],
             degrees_of_freedom: vec![self.kept.max(0.0) + constant; outputs],
-            residual_norm: frame.outer_residual_norms(norms),
+            residual_norm: frame.residual_norms_in_original_units(norms),
             beta_norm: beta.columns().into_iter().map(norm).collect(),
             leave_one_out: None,
         };

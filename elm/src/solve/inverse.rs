@@ -1,9 +1,10 @@
 //! Equation 10: $\beta = H^{-1} T$ for square $H$.
 
 use ndarray::Array1;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use super::equilibration::Prepared;
+use super::equilibration::EquilibratedProblem;
 use super::norms::{norm, rounding};
 use super::{Diagnosis, LeastSquares, Reason, Route, Solution};
 use crate::error::{Error, Result};
@@ -23,12 +24,13 @@ use crate::scalar::Scalar;
 /// use ndarray::array;
 ///
 /// let (x, t) = (array![[0.0], [1.0], [2.0]], array![1.0, -1.0, 1.0]);
-/// let model = ElmParams::new(3).solver(Inverse).fit(&x, &t)?;
-/// assert!((model.predict(&x)?[[1, 0]] + 1.0_f64).abs() < 1e-9);
-/// assert!(ElmParams::new(4).solver(Inverse).fit(&x, &t).is_err());
+/// let model = ElmParams::new(3).with_solver(Inverse).fit(&x, &t)?;
+/// assert!((model.predict(&x)?[1] + 1.0_f64).abs() < 1e-9);
+/// assert!(ElmParams::new(4).with_solver(Inverse).fit(&x, &t).is_err());
 /// # Ok::<(), elm::Error>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Inverse;
 
 impl Inverse {
@@ -49,12 +51,12 @@ impl Inverse {
         if rows != neurons {
             return Err(Error::NotSquare { rows, neurons });
         }
-        // Scaled by powers of two, so that squares inside the factorisations stay in range.
-        let Prepared {
+        // Scaled by powers of two, so that squares inside the factorizations stay in range.
+        let EquilibratedProblem {
             hidden,
             targets,
             frame,
-        } = Prepared::new(problem);
+        } = EquilibratedProblem::new(problem);
         let s = A::singular_values(hidden.view())?;
         let (largest, smallest) = (s[0], s[s.len() - 1]);
         let singular = |reciprocal_condition| Error::Singular {
@@ -75,17 +77,18 @@ impl Inverse {
         };
         let outputs = problem.outputs();
         let residual = targets - A::product(hidden.view(), scaled.view());
-        let beta = frame.restore(scaled);
+        let beta = frame.unscale(scaled);
         let diagnosis = Diagnosis {
             route: Route::Lu,
             reason: Reason::SquareSystem,
             rank: Some(neurons),
             condition: Some((largest / smallest).as_f64()),
-            largest_singular_value: frame.outer_singular_value(largest),
-            smallest_singular_value: Some(frame.outer_singular_value(smallest)),
+            largest_singular_value: frame.singular_value_in_original_units(largest),
+            smallest_singular_value: Some(frame.singular_value_in_original_units(smallest)),
             lambda: vec![0.0; outputs],
             degrees_of_freedom: vec![neurons as f64; outputs],
-            residual_norm: frame.outer_residual_norms(residual.columns().into_iter().map(norm)),
+            residual_norm: frame
+                .residual_norms_in_original_units(residual.columns().into_iter().map(norm)),
             beta_norm: beta.columns().into_iter().map(norm).collect(),
             leave_one_out: None,
         };

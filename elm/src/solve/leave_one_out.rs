@@ -1,4 +1,4 @@
-//! Leave-one-out scores of many strengths at once: from the rows of a factorisation, or from rows
+//! Leave-one-out scores of many strengths at once: from the rows of a factorization, or from rows
 //! that pass by a tile at a time.
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
@@ -45,10 +45,15 @@ impl<'p, A: Scalar> Scores<'p, A> {
     }
 
     /// Adds rows, given what [`DesignSvdWithRows`] knows of them.
-    fn add(&mut self, u: ArrayView2<'_, A>, residual: ArrayView2<'_, A>, free: ArrayView1<'_, A>) {
+    fn add(
+        &mut self,
+        u: ArrayView2<'_, A>,
+        residual: ArrayView2<'_, A>,
+        one_minus_leverage: ArrayView1<'_, A>,
+    ) {
         let squared = u.mapv(|u| u * u);
         let mut denominators = A::product(squared.view(), self.complements.view());
-        denominators += &free.insert_axis(Axis(1));
+        denominators += &one_minus_leverage.insert_axis(Axis(1));
         let c = self.spectrum.c.view();
         for (output, mut score) in self.sums.columns_mut().into_iter().enumerate() {
             let held = &self.complements * &c.slice(s![.., output..=output]);
@@ -98,7 +103,7 @@ pub(super) fn scores<A: Scalar>(
         scores.add(
             rows.u.slice(s![block.clone(), ..]),
             rows.residual.slice(s![block.clone(), ..]),
-            rows.free.slice(s![block]),
+            rows.one_minus_leverage.slice(s![block]),
         );
     }
     scores.finish(candidates, roundoff)
@@ -111,7 +116,7 @@ pub(super) fn scores<A: Scalar>(
 /// scored from a problem in which the triangle of the other rows stands for them.
 ///
 /// # Errors
-/// Those of making the rows and of the factorisations.
+/// Those of making the rows and of the factorizations.
 pub(super) fn scores_of_tiles<A: Scalar>(
     tiles: &mut Tiles<'_, '_, A>,
     spectrum: &DesignSvd<f64>,
@@ -189,23 +194,27 @@ impl Pass<'_> {
         let (targets, ones) = rest.split_at(Axis(1), spectrum.c.ncols());
         let u = f64::product(hidden, self.to_u.view());
         let residual = &targets - &f64::product(u.view(), spectrum.c.view());
-        let mut free = u.map_axis(Axis(1), |row| 1.0 - row.dot(&row));
+        let mut one_minus_leverage = u.map_axis(Axis(1), |row| 1.0 - row.dot(&row));
         if let Some(roots) = ones.columns().into_iter().next() {
             let total = spectrum.frame.total_weight;
-            Zip::from(&mut free)
+            Zip::from(&mut one_minus_leverage)
                 .and(roots)
-                .for_each(|free, root| *free -= root * root / total);
+                .for_each(|one_minus_leverage, root| *one_minus_leverage -= root * root / total);
         }
-        if free.iter().all(|free| *free >= CLOSE) {
-            self.scores.add(u.view(), residual.view(), free.view());
+        if one_minus_leverage
+            .iter()
+            .all(|one_minus_leverage| *one_minus_leverage >= CLOSE)
+        {
+            self.scores
+                .add(u.view(), residual.view(), one_minus_leverage.view());
             return;
         }
         let (far, near): (Vec<usize>, Vec<usize>) =
-            (0..free.len()).partition(|&row| free[row] >= CLOSE);
+            (0..one_minus_leverage.len()).partition(|&row| one_minus_leverage[row] >= CLOSE);
         self.scores.add(
             u.select(Axis(0), &far).view(),
             residual.select(Axis(0), &far).view(),
-            free.select(Axis(0), &far).view(),
+            one_minus_leverage.select(Axis(0), &far).view(),
         );
         self.close.extend(near.iter().map(|&row| rows[row]));
     }
@@ -349,7 +358,7 @@ fn scores_of_close_rows<A: Scalar>(
     scores.add(
         rows.u.slice(s![from.., ..]),
         rows.residual.slice(s![from.., ..]),
-        rows.free.slice(s![from..]),
+        rows.one_minus_leverage.slice(s![from..]),
     );
     Ok(scores.sums)
 }

@@ -6,7 +6,7 @@
 //! | [`PseudoInverse`] | 11, $\beta = H^{+}T$ | the paper's general case: least squares, minimum norm |
 //! | [`Ridge`] | $\beta = \arg\min \lVert H\beta - T\rVert^2 + \lambda\lVert\beta\rVert^2$ | everything else; the default |
 //!
-//! All take any number of outputs (columns of $T$) and answer them from one factorisation. Each
+//! All take any number of outputs (columns of $T$) and answer them from one factorization. Each
 //! returns a [`Diagnosis`] beside the weights. A [`LeastSquares`] problem can be solved without a
 //! network around it:
 //!
@@ -31,6 +31,7 @@ mod gram;
 mod inverse;
 pub(crate) mod lanczos;
 mod leave_one_out;
+#[cfg(feature = "serde")]
 mod named;
 pub(crate) mod normal_equations;
 pub(crate) mod norms;
@@ -45,6 +46,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, ArrayView2, Axis};
+#[cfg(feature = "serde")]
 use serde::Serialize;
 
 use crate::check::{check_length, check_matrix, check_some_weight, present};
@@ -69,7 +71,7 @@ pub use ridge::{Lambda, Ridge};
 /// let (h, t) = (array![[0.0], [1.0], [2.0]], array![[5.0], [7.0], [100.0]]);
 /// // The third row counts for nothing, and a line needs its constant.
 /// let weights = array![1.0, 1.0, 0.0];
-/// let problem = LeastSquares::new(&h, &t)?.weights(&weights)?.intercept(true);
+/// let problem = LeastSquares::new(&h, &t)?.with_weights(&weights)?.with_intercept(true);
 /// let solution = Solver::from(PseudoInverse::default()).solve(&problem)?;
 /// assert!((solution.beta[[0, 0]] - 2.0_f64).abs() < 1e-12);
 /// assert!((solution.intercept[0] - 5.0_f64).abs() < 1e-12);
@@ -111,17 +113,31 @@ impl<'a, A: Scalar> LeastSquares<'a, A> {
     /// # Errors
     /// [`Error::Shape`] when there is not one weight per row, [`Error::Parameter`] when one is
     /// negative or not finite or when all are 0.
-    pub fn weights(mut self, weights: &'a ArrayRef1<A>) -> Result<Self> {
+    #[doc(alias = "sample_weight")]
+    pub fn with_weights(mut self, weights: &'a ArrayRef1<A>) -> Result<Self> {
         check_some_weight(weights.view(), self.hidden.nrows())?;
         self.weights = Some(weights.view());
         Ok(self)
     }
 
-    /// Adds a constant to each output that no solver penalises; off by default.
+    /// Adds a constant to each output that no solver penalizes; off by default.
     #[must_use]
-    pub fn intercept(mut self, intercept: bool) -> Self {
+    #[doc(alias = "fit_intercept")]
+    pub fn with_intercept(mut self, intercept: bool) -> Self {
         self.intercept = intercept;
         self
+    }
+
+    /// The weight of each row, where there are any.
+    #[must_use]
+    pub fn weights(&self) -> Option<ArrayView1<'a, A>> {
+        self.weights
+    }
+
+    /// Whether each output has a constant that is not penalized.
+    #[must_use]
+    pub fn intercept(&self) -> bool {
+        self.intercept
     }
 
     pub(crate) fn hidden(&self) -> ArrayView2<'a, A> {
@@ -190,24 +206,25 @@ impl Solution<f64> {
 /// use ndarray::{Array1, Axis};
 ///
 /// let x = Array1::linspace(-3.0, 3.0, 60).insert_axis(Axis(1));
-/// let t = x.mapv(f64::sin);
+/// let t = x.column(0).mapv(f64::sin);
 /// for name in ["pseudo-inverse", "ridge"] {
 ///     let solver: Solver = name.parse()?;
-///     let model = ElmParams::new(15).solver(solver).fit(&x, &t)?;
-///     let error = elm::metrics::rmse(&model.predict(&x)?.column(0), &t.column(0))?;
+///     let model = ElmParams::new(15).with_solver(solver).fit(&x, &t)?;
+///     let error = elm::metrics::rmse(&model.predict(&x)?, &t)?;
 ///     assert!(error < 1e-3, "{name}: {error}");
 /// }
 /// # Ok::<(), elm::Error>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Solver {
     /// Equation 10.
     Inverse(Inverse),
     /// Equation 11.
     PseudoInverse(PseudoInverse),
-    /// Regularised least squares.
+    /// Regularized least squares.
     Ridge(Ridge),
 }
 
@@ -220,7 +237,7 @@ impl Solver {
     /// # Errors
     /// [`Error::Parameter`] for a setting out of range; [`Error::NotSquare`],
     /// [`Error::Singular`] and [`Error::Conflict`] from [`Inverse`]; [`Error::Overflow`] when the
-    /// answer does not fit the type; [`Error::NoConvergence`] from the factorisation.
+    /// answer does not fit the type; [`Error::NoConvergence`] from the factorization.
     pub fn solve<A: Scalar>(&self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
         self.check()?;
         let Some(rows) = problem.weights.and_then(present) else {
@@ -276,7 +293,7 @@ impl Solver {
         })
     }
 
-    /// The same, but choosing by generalised cross-validation where leave-one-out was to choose.
+    /// The same, but choosing by generalized cross-validation where leave-one-out was to choose.
     pub(crate) fn without_rows(self) -> Self {
         match self {
             Self::Ridge(ridge) => Self::Ridge(ridge.without_rows()),

@@ -1,6 +1,6 @@
 //! Sums of products of all columns, hidden and target, over rows that exist a tile at a time.
 //!
-//! Columns are taken less a value near their mean, so that centring them for an intercept is a
+//! Columns are taken less a value near their mean, so that centering them for an intercept is a
 //! small correction afterwards (Chan, Golub and LeVeque, Algorithms for Computing the Sample
 //! Variance, 1983, section 3, for one column); the correction's size is known, and with it what
 //! it costs in digits.
@@ -163,7 +163,7 @@ impl<A: Scalar> RowSource<'_, A> {
     }
 }
 
-/// A problem as its normal equations: rows weighted, columns centred where there is an intercept.
+/// A problem as its normal equations: rows weighted, columns centered where there is an intercept.
 pub(crate) struct NormalEquations<A: Scalar> {
     /// $\tilde H^T \tilde H$, the lower half, by columns.
     pub(crate) gram: Array2<A>,
@@ -171,7 +171,7 @@ pub(crate) struct NormalEquations<A: Scalar> {
     pub(crate) right: Array2<A>,
     /// The sum of squares of each column of $\tilde T$.
     pub(crate) squares: Array1<A>,
-    /// What centring took out of the sums, as a share of the smallest thing that it may matter
+    /// What centering took out of the sums, as a share of the smallest thing that it may matter
     /// beside: $n \lVert \delta \rVert^2$ for $\delta$ the distance of the means from where the columns
     /// were shifted to.
     pub(crate) correction: A,
@@ -207,7 +207,7 @@ impl<A: Scalar> NormalEquations<A> {
                 source.write(run.clone(), &frame, &shift, to)?;
                 roots.extend(frame.root_weights.slice(s![run]));
             }
-            shift = centre_of(&tile, width, &Array1::from(roots));
+            shift = center_of(&tile, width, &Array1::from(roots));
         }
         for first in (0..rows).step_by(tile_rows) {
             let range = first..rows.min(first + tile_rows);
@@ -216,7 +216,7 @@ impl<A: Scalar> NormalEquations<A> {
             if source.intercept && rows <= tile_rows {
                 // All rows are here: made once, shifted now.
                 let roots = &frame.root_weights;
-                shift = centre_of(tile, width, roots);
+                shift = center_of(tile, width, roots);
                 for (row, &root) in tile.chunks_exact_mut(width).zip(roots) {
                     for (value, &shift) in row.iter_mut().zip(&shift) {
                         *value -= shift * root;
@@ -297,7 +297,7 @@ impl<A: Scalar> NormalEquations<A> {
         let (width, tile_rows) = (source.width(), source.tile_rows());
         let mut tile = vec![A::zero(); tile_rows * width];
         let mut squares = Array1::zeros(outputs);
-        // What the shifted rows are still short of being centred.
+        // What the shifted rows are still short of being centered.
         let scaled = &self.frame.target_mean / &self.frame.target_scale;
         let constant = if self.frame.intercept {
             let hidden = &self.frame.hidden_mean / self.frame.hidden_scale
@@ -345,7 +345,7 @@ pub(super) fn spread_runs(rows: usize, wanted: usize) -> impl Iterator<Item = Ra
 /// A value near each column's weighted mean over a tile that has not been shifted; for a column that
 /// is constant there, its value to the last bit, so that what is left of it is 0. The last column,
 /// of ones, is left out.
-pub(super) fn centre_of<A: Scalar>(tile: &[A], width: usize, roots: &Array1<A>) -> Vec<A> {
+pub(super) fn center_of<A: Scalar>(tile: &[A], width: usize, roots: &Array1<A>) -> Vec<A> {
     let mut rows = tile
         .chunks_exact(width)
         .zip(roots)

@@ -7,7 +7,7 @@ use crate::scalar::Scalar;
 /// The level below which a singular value of a matrix of this size is rounding error, relative to
 /// the largest one.
 pub(crate) fn rounding<A: Scalar>(rows: usize, columns: usize) -> A {
-    // The backward error of the factorisations grows like the root of the size in practice; the
+    // The backward error of the factorizations grows like the root of the size in practice; the
     // usual bound eps * max(rows, columns) would cut at 0.01 for 100,000 rows of f32.
     A::epsilon() * A::from_f64(4.0 * (rows.max(columns) as f64).sqrt())
 }

@@ -1,10 +1,11 @@
-//! Equation 11: $\beta = H^{+} T$ with the Moore-Penrose generalised inverse.
+//! Equation 11: $\beta = H^{+} T$ with the Moore-Penrose generalized inverse.
 
 use ndarray::{Array2, Axis};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use super::design_svd::DesignSvd;
-use super::equilibration::{Equilibration, Prepared};
+use super::equilibration::{EquilibratedProblem, Equilibration};
 use super::lanczos::largest_eigenvalue;
 use super::normal_equations::RowSource;
 use super::norms::{norm, rounding};
@@ -37,10 +38,14 @@ use crate::scalar::Scalar;
 /// assert!(solution.beta.iter().all(|beta: &f64| (beta - 1.0).abs() < 1e-12));
 /// # Ok::<(), elm::Error>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct PseudoInverse {
-    #[serde(serialize_with = "crate::numbers::finite_if_any")]
+    #[cfg_attr(
+        feature = "serde",
+        serde(serialize_with = "crate::numbers::finite_if_any")
+    )]
     cutoff: Option<f64>,
 }
 
@@ -76,12 +81,12 @@ impl PseudoInverse {
         if let Some(solution) = self.solve_rows(&mut problem.row_source())? {
             return Ok(solution);
         }
-        let prepared = Prepared::new(problem);
+        let prepared = EquilibratedProblem::new(problem);
         let (hidden, targets) = (prepared.hidden.view(), prepared.targets.view());
         if hidden.nrows() < hidden.ncols() {
             return Ok(self.solve_spectrum(&DesignSvd::from_prepared(prepared)?));
         }
-        let triangle = A::triangularise(hidden, targets)?;
+        let triangle = A::triangularize(hidden, targets)?;
         if let Some(solution) = self.solve_triangle(&triangle, &prepared.frame) {
             return Ok(solution);
         }
@@ -105,15 +110,15 @@ impl PseudoInverse {
         let Some(mut tiles) = Tiles::new(source)? else {
             return Ok(None);
         };
-        let Some((triangle, frame)) = tiles.centred_triangle()? else {
+        let Some((triangle, frame)) = tiles.centered_triangle()? else {
             return Ok(None);
         };
-        self.solve_centred(triangle.narrow(), frame.narrow())
+        self.solve_centered(triangle.narrow(), frame.narrow())
             .map(Some)
     }
 
     /// The answer for a problem of many more rows than neurons that is reduced to its triangle.
-    pub(super) fn solve_centred<A: Scalar>(
+    pub(super) fn solve_centered<A: Scalar>(
         self,
         triangle: QrFactor<A>,
         frame: Equilibration<A>,
@@ -166,7 +171,7 @@ impl PseudoInverse {
         if smallest <= level.max(cutoff) * largest {
             return None;
         }
-        let beta = frame.restore(A::solve_upper(r, triangle.qtb.view()).ok()?);
+        let beta = frame.unscale(A::solve_upper(r, triangle.qtb.view()).ok()?);
         let outputs = beta.ncols();
         let spanned = frame.spanned_by(neurons);
         let residual = |&squares: &A| {
@@ -182,11 +187,12 @@ impl PseudoInverse {
             reason: Reason::FullRank,
             rank: Some(neurons),
             condition: Some((largest / smallest).as_f64()),
-            largest_singular_value: frame.outer_singular_value(largest),
-            smallest_singular_value: Some(frame.outer_singular_value(smallest)),
+            largest_singular_value: frame.singular_value_in_original_units(largest),
+            smallest_singular_value: Some(frame.singular_value_in_original_units(smallest)),
             lambda: vec![0.0; outputs],
             degrees_of_freedom: vec![freedom; outputs],
-            residual_norm: frame.outer_residual_norms(triangle.residual_ss.iter().map(residual)),
+            residual_norm: frame
+                .residual_norms_in_original_units(triangle.residual_ss.iter().map(residual)),
             beta_norm: beta.columns().into_iter().map(norm).collect(),
             leave_one_out: None,
         };

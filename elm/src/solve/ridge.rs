@@ -1,11 +1,12 @@
-//! Regularised least squares: $\beta = \arg\min \lVert H\beta - T\rVert^2 + \lambda
+//! Regularized least squares: $\beta = \arg\min \lVert H\beta - T\rVert^2 + \lambda
 //! s_1^2 \lVert\beta\rVert^2$.
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use super::design_svd::{DesignSvd, DesignSvdWithRows};
-use super::equilibration::Prepared;
+use super::equilibration::EquilibratedProblem;
 use super::leave_one_out::{self, NEGLIGIBLE};
 use super::normal_equations::RowSource;
 use super::tiles::{self, Tiles};
@@ -13,25 +14,26 @@ use super::{LeastSquares, Reason, Solution, gram};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 
-/// How strongly [`Ridge`] regularises, always relative to the largest squared singular value
+/// How strongly [`Ridge`] regularizes, always relative to the largest squared singular value
 /// $s_1^2$ of the hidden-layer matrix: a fixed number would mean something else for every number
 /// of rows and every scale of activations.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum Lambda {
     /// This value, positive and finite.
-    Relative(#[serde(serialize_with = "crate::numbers::finite")] f64),
+    Relative(#[cfg_attr(feature = "serde", serde(serialize_with = "crate::numbers::finite"))] f64),
     /// The value with the smallest exact leave-one-out error (Allen's PRESS, 1974), or the strongest
     /// whose squared error is within 1 % of that.
     #[default]
     LeaveOneOut,
-    /// The same by the generalised cross-validation score (Golub, Heath and Wahba, 1979): cheaper than
+    /// The same by the generalized cross-validation score (Golub, Heath and Wahba, 1979): cheaper than
     /// leave-one-out as it does not visit the rows.
     Gcv,
 }
 
-/// Ridge regression (Tikhonov regularisation), one factorisation for all outputs and all
-/// candidate strengths. Each output gets its own unless [`shared`](Ridge::shared) is set.
+/// Ridge regression (Tikhonov regularization), one factorization for all outputs and all
+/// candidate strengths. Each output gets its own unless [`shared`](Ridge::with_shared) is set.
 ///
 /// A strength that is not given is searched for from where everything is held back to where
 /// nothing is. The score of a candidate is its held-out squared error plus the error that rounding
@@ -59,15 +61,16 @@ pub enum Lambda {
 /// assert_eq!(chosen.diagnosis.lambda.len(), 1);
 /// # Ok::<(), elm::Error>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct Ridge {
     lambda: Lambda,
     shared: bool,
 }
 
 impl Ridge {
-    /// The weakest regularisation that is chosen by itself, about the square of `f64`'s epsilon: all
+    /// The weakest regularization that is chosen by itself, about the square of `f64`'s epsilon: all
     /// directions that it would affect are lost to rounding.
     pub const FLOOR: f64 = 1e-31;
 
@@ -92,7 +95,7 @@ impl Ridge {
         }
     }
 
-    /// A strength chosen by generalised cross-validation.
+    /// A strength chosen by generalized cross-validation.
     #[must_use]
     pub fn gcv() -> Self {
         Self {
@@ -104,7 +107,7 @@ impl Ridge {
     /// One strength for all outputs, chosen by the mean of their scores, each relative to that
     /// output's variance.
     #[must_use]
-    pub fn shared(mut self, shared: bool) -> Self {
+    pub fn with_shared(mut self, shared: bool) -> Self {
         self.shared = shared;
         self
     }
@@ -120,7 +123,7 @@ impl Ridge {
     /// Of those a search leaves out the many that are one fit: all that hold back less than
     /// rounding error of the smallest direction, and most that hold back less than 1 % of it.
     #[must_use]
-    pub fn candidates() -> Vec<f64> {
+    pub fn lambda_grid() -> Vec<f64> {
         grid(FIRST_STEP).map(strength).collect()
     }
 
@@ -143,7 +146,7 @@ impl Ridge {
         }
         match self.lambda {
             Lambda::Relative(lambda) => {
-                let prepared = Prepared::new(problem);
+                let prepared = EquilibratedProblem::new(problem);
                 if gram::allowed::<A>(lambda)
                     && let Some(solution) = gram::solve(&prepared, lambda)
                 {
@@ -187,7 +190,7 @@ impl Ridge {
         };
         match self.lambda {
             Lambda::Relative(_) => {
-                let Some((triangle, frame)) = tiles.centred_triangle()? else {
+                let Some((triangle, frame)) = tiles.centered_triangle()? else {
                     return Ok(None);
                 };
                 let spectrum = DesignSvd::<A>::of_triangle(triangle.narrow(), frame.narrow())?;
@@ -209,15 +212,20 @@ impl Ridge {
         let Some(spectrum) = tiles.spectrum()? else {
             return Ok(None);
         };
-        let reason = Reason::StrengthSearch;
+        let reason = Reason::LambdaSearch;
         if self.lambda == Lambda::Gcv {
             let lambda = self.by_gcv(&spectrum, roundoff);
-            return Ok(Some(answer(&spectrum, reason, &lambda, None)));
+            return Ok(Some(ridge_solution(&spectrum, reason, &lambda, None)));
         }
-        let candidates = distinct(&spectrum);
+        let candidates = distinguishable_lambdas(&spectrum);
         let scores = self.worthwhile_scores(tiles, &spectrum, &candidates, roundoff)?;
-        let (lambda, errors) = self.strengths_and_errors(&spectrum, &candidates, &scores);
-        Ok(Some(answer(&spectrum, reason, &lambda, Some(errors))))
+        let (lambda, errors) = self.lambda_and_errors(&spectrum, &candidates, &scores);
+        Ok(Some(ridge_solution(
+            &spectrum,
+            reason,
+            &lambda,
+            Some(errors),
+        )))
     }
 
     /// The answer by the best strength for predictions in arithmetic of this unit roundoff.
@@ -226,17 +234,17 @@ impl Ridge {
         problem: &LeastSquares<'_, f64>,
         roundoff: f64,
     ) -> Result<Solution<f64>> {
-        let reason = Reason::StrengthSearch;
+        let reason = Reason::LambdaSearch;
         if self.lambda == Lambda::Gcv {
             let spectrum = DesignSvd::new(problem)?;
             let lambda = self.by_gcv(&spectrum, roundoff);
-            return Ok(answer(&spectrum, reason, &lambda, None));
+            return Ok(ridge_solution(&spectrum, reason, &lambda, None));
         }
         let rows = DesignSvdWithRows::new(problem)?;
         let (lambda, errors) = self.by_leave_one_out(&rows, roundoff);
         // Without its only row a problem has nothing to place an intercept by.
         let errors = rows.spectrum.can_lose_a_row().then_some(errors);
-        Ok(answer(&rows.spectrum, reason, &lambda, errors))
+        Ok(ridge_solution(&rows.spectrum, reason, &lambda, errors))
     }
 
     /// Leave-one-out scores of the candidates that may be chosen, and for the others, which hold too
@@ -249,7 +257,7 @@ impl Ridge {
         candidates: &[f64],
         roundoff: f64,
     ) -> Result<Array2<f64>> {
-        /// What generalised cross-validation may be off by.
+        /// What generalized cross-validation may be off by.
         const MARGIN: f64 = 1.05;
         let rows = spectrum.frame.weighted_rows as f64;
         let expected = gcv_scores(spectrum, candidates, roundoff) * (rows * rows);
@@ -274,15 +282,15 @@ impl Ridge {
         leave_one_out::scores_of_tiles(tiles, spectrum, candidates, roundoff)
     }
 
-    /// Solves without the rows, from which leave-one-out would choose: by generalised
+    /// Solves without the rows, from which leave-one-out would choose: by generalized
     /// cross-validation then.
     pub(super) fn solve_spectrum<A: Scalar>(self, spectrum: &DesignSvd<A>) -> Solution<A> {
         let reason = match self.lambda {
             Lambda::Relative(_) => Reason::WeakRidge,
-            Lambda::Gcv | Lambda::LeaveOneOut => Reason::StrengthSearch,
+            Lambda::Gcv | Lambda::LeaveOneOut => Reason::LambdaSearch,
         };
-        let lambda = self.strengths_without_rows(spectrum);
-        answer(spectrum, reason, &lambda, None)
+        let lambda = self.select_lambda_without_rows(spectrum);
+        ridge_solution(spectrum, reason, &lambda, None)
     }
 
     pub(super) fn without_rows(self) -> Self {
@@ -295,8 +303,8 @@ impl Ridge {
         }
     }
 
-    /// The strength for each output, from a factorisation that is there already.
-    pub(crate) fn strengths<A: Scalar>(self, rows: &DesignSvdWithRows<A>) -> Vec<f64> {
+    /// The strength for each output, from a factorization that is there already.
+    pub(crate) fn select_lambda<A: Scalar>(self, rows: &DesignSvdWithRows<A>) -> Vec<f64> {
         match self.lambda {
             Lambda::Relative(lambda) => vec![lambda; rows.spectrum.c.ncols()],
             Lambda::Gcv => self.by_gcv(&rows.spectrum, unit_roundoff::<A>()),
@@ -304,8 +312,8 @@ impl Ridge {
         }
     }
 
-    /// The same without the rows: by generalised cross-validation where leave-one-out was to choose.
-    pub(crate) fn strengths_without_rows<A: Scalar>(self, spectrum: &DesignSvd<A>) -> Vec<f64> {
+    /// The same without the rows: by generalized cross-validation where leave-one-out was to choose.
+    pub(crate) fn select_lambda_without_rows<A: Scalar>(self, spectrum: &DesignSvd<A>) -> Vec<f64> {
         match self.lambda {
             Lambda::Relative(lambda) => vec![lambda; spectrum.c.ncols()],
             Lambda::Gcv | Lambda::LeaveOneOut => self.by_gcv(spectrum, unit_roundoff::<A>()),
@@ -313,7 +321,7 @@ impl Ridge {
     }
 
     fn by_gcv<A: Scalar>(self, spectrum: &DesignSvd<A>, roundoff: f64) -> Vec<f64> {
-        let candidates = distinct(spectrum);
+        let candidates = distinguishable_lambdas(spectrum);
         let scores = gcv_scores(spectrum, &candidates, roundoff);
         let chosen = self.choose(spectrum, &scores);
         chosen.iter().map(|&i| candidates[i]).collect()
@@ -325,13 +333,13 @@ impl Ridge {
         rows: &DesignSvdWithRows<A>,
         roundoff: f64,
     ) -> (Vec<f64>, Vec<f64>) {
-        let candidates = distinct(&rows.spectrum);
+        let candidates = distinguishable_lambdas(&rows.spectrum);
         let scores = leave_one_out::scores(rows, &candidates, roundoff);
-        self.strengths_and_errors(&rows.spectrum, &candidates, &scores)
+        self.lambda_and_errors(&rows.spectrum, &candidates, &scores)
     }
 
     /// The best candidate of each output, and the root of its mean score.
-    fn strengths_and_errors<A: Scalar>(
+    fn lambda_and_errors<A: Scalar>(
         self,
         spectrum: &DesignSvd<A>,
         candidates: &[f64],
@@ -361,7 +369,7 @@ impl Ridge {
     }
 
     /// For each output the index of the strongest candidate that is as good as the best, to within
-    /// [`TOLERANCE`], so that a flat score never means an unregularised fit.
+    /// [`TOLERANCE`], so that a flat score never means an unregularized fit.
     fn choose<A: Scalar>(self, spectrum: &DesignSvd<A>, scores: &Array2<f64>) -> Vec<usize> {
         let outputs = scores.ncols();
         if !self.shared {
@@ -396,7 +404,7 @@ fn strength(step: i32) -> f64 {
 }
 
 /// The candidates that make a difference to this problem, rising.
-fn distinct<A: Scalar>(spectrum: &DesignSvd<A>) -> Vec<f64> {
+fn distinguishable_lambdas<A: Scalar>(spectrum: &DesignSvd<A>) -> Vec<f64> {
     let smallest = match (spectrum.s.first(), spectrum.s.last()) {
         (Some(&first), Some(&last)) => (last / first).as_f64().powi(2),
         _ => 1.0,
@@ -419,7 +427,7 @@ fn unit_roundoff<A: Scalar>() -> f64 {
 }
 
 /// The solution at these relative strengths, one per output.
-pub(crate) fn answer<A: Scalar>(
+pub(crate) fn ridge_solution<A: Scalar>(
     spectrum: &DesignSvd<A>,
     reason: Reason,
     lambda: &[f64],

@@ -81,11 +81,11 @@ impl<A: Scalar> Problem<A> {
         let wide = self.wide();
         let mut problem = LeastSquares::new(&wide.hidden, &wide.targets).unwrap();
         if let Some(weights) = &wide.weights {
-            problem = problem.weights(weights).unwrap();
+            problem = problem.with_weights(weights).unwrap();
         }
         let roundoff = A::epsilon().as_f64() / 2.0;
         ridge
-            .search(&problem.intercept(self.intercept), roundoff)
+            .search(&problem.with_intercept(self.intercept), roundoff)
             .unwrap()
     }
 
@@ -107,7 +107,7 @@ impl<A: Scalar> Problem<A> {
         for ridge in [
             Ridge::leave_one_out(),
             Ridge::gcv(),
-            Ridge::leave_one_out().shared(true),
+            Ridge::leave_one_out().with_shared(true),
         ] {
             let (tiles, matrix) = (self.by_tiles(ridge), self.by_matrix(ridge));
             let (d, e) = (&tiles.diagnosis, &matrix.diagnosis);
@@ -307,12 +307,12 @@ fn the_triangle_serves_the_pseudo_inverse_and_weak_strengths() {
     for hidden in [normal(900, 10, 15), smooth(900, 16)] {
         let problem = Problem::new(hidden, 2, 0.3);
         let whole = LeastSquares::new(&problem.hidden, &problem.targets).unwrap();
-        let whole = whole.intercept(true);
+        let whole = whole.with_intercept(true);
         let mut source = problem.source();
         let mut tiles = Tiles::new(&mut source).unwrap().unwrap();
-        let (triangle, frame) = tiles.centred_triangle().unwrap().unwrap();
+        let (triangle, frame) = tiles.centered_triangle().unwrap().unwrap();
         let solver = PseudoInverse::default();
-        let tiles = solver.solve_centred(triangle, frame).unwrap();
+        let tiles = solver.solve_centered(triangle, frame).unwrap();
         let matrix = solver.solve(&whole).unwrap();
         assert_eq!(tiles.diagnosis.rank, matrix.diagnosis.rank);
         assert_eq!(tiles.diagnosis.route, matrix.diagnosis.route);

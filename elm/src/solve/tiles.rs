@@ -12,13 +12,13 @@ use super::Route;
 use super::design_svd::DesignSvd;
 use super::equilibration::{Equilibration, magnitudes};
 use super::gram;
-use super::normal_equations::{NormalEquations, RowSource, centre_of, spread_runs};
+use super::normal_equations::{NormalEquations, RowSource, center_of, spread_runs};
 use crate::error::Result;
 use crate::linalg::{Backend, QrFactor, Svd};
 use crate::scalar::{Scalar, power_of_two};
 
 /// Rows for each column below which a problem is answered from its matrix, which costs no second
-/// look at the rows, and is factorised as accurately as it can be.
+/// look at the rows, and is factorized as accurately as it can be.
 const ROWS_PER_COLUMN: usize = 16;
 /// Entries of a hidden-layer matrix that is small enough to be there.
 const SMALL: usize = 1 << 22;
@@ -35,8 +35,8 @@ fn has_many_rows(rows: usize, columns: usize) -> bool {
 /// Rows of a sample, in units of the columns: enough to see what the condition is about.
 const SAMPLE: usize = 4;
 /// Rows below which a sample's means are not yet near those of all rows.
-const LEAST_SAMPLE: usize = 256;
-/// Rows that enter the triangle together, in units of the columns: what is factorised again with
+const MIN_SAMPLE: usize = 256;
+/// Rows that enter the triangle together, in units of the columns: what is factorized again with
 /// every block is a small part of it.
 const BLOCK: usize = 6;
 /// Bytes in a tile of rows, which should stay in the cache.
@@ -168,7 +168,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     /// Those of making the rows.
     fn look(&mut self) -> Result<bool> {
         let width = self.source.width();
-        let wanted = (SAMPLE * width).max(LEAST_SAMPLE).min(self.rows());
+        let wanted = (SAMPLE * width).max(MIN_SAMPLE).min(self.rows());
         let mut sample = Vec::with_capacity(wanted * width);
         let mut roots = Vec::with_capacity(wanted);
         let zeros = vec![0.0; self.shift.len()];
@@ -178,7 +178,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         }
         let roots = Array1::from(roots);
         if self.frame.intercept {
-            self.shift = centre_of(&sample, width, &roots);
+            self.shift = center_of(&sample, width, &roots);
             for (row, root) in sample.chunks_exact_mut(width).zip(&roots) {
                 for (value, shift) in row.iter_mut().zip(&self.shift) {
                     *value -= shift * root;
@@ -194,7 +194,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         }
         let hidden = sample.slice(s![.., ..neurons]);
         let nothing = Array2::zeros((sample.nrows(), 0));
-        let QrFactor { r, .. } = f64::triangularise(hidden, nothing.view())?;
+        let QrFactor { r, .. } = f64::triangularize(hidden, nothing.view())?;
         // Pivots bound the smallest singular value from above, columns the largest from below.
         let smallest = r.diag().fold(f64::INFINITY, |m: f64, v| m.min(v.abs()));
         let largest = squares(r.view()).fold(0.0, |m: f64, v| m.max(*v)).sqrt();
@@ -205,7 +205,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     /// of range. From sums of products where their condition allows it, else from the triangle.
     ///
     /// # Errors
-    /// Those of making the rows and of the factorisations.
+    /// Those of making the rows and of the factorizations.
     pub(super) fn spectrum(&mut self) -> Result<Option<DesignSvd<f64>>> {
         if self.look()?
             && let Some(spectrum) = self.spectrum_of_products()?
@@ -222,8 +222,8 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     /// out of range.
     ///
     /// # Errors
-    /// Those of making the rows and of the factorisation.
-    pub(super) fn centred_triangle(
+    /// Those of making the rows and of the factorization.
+    pub(super) fn centered_triangle(
         &mut self,
     ) -> Result<Option<(QrFactor<f64>, Equilibration<f64>)>> {
         self.look()?;
@@ -285,7 +285,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     /// these, less `shift`.
     ///
     /// # Errors
-    /// Those of making the rows and of the factorisation.
+    /// Those of making the rows and of the factorization.
     pub(super) fn triangle_without(
         &mut self,
         left_out: &[usize],
@@ -302,18 +302,18 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         triangle
     }
 
-    /// The triangle of the centred rows, and their means.
+    /// The triangle of the centered rows, and their means.
     fn triangle(&mut self) -> Result<Option<(QrFactor<f64>, Equilibration<f64>)>> {
         let shift = std::mem::take(&mut self.shift);
         let all = self.stacked(&shift)?;
-        let triangle = self.centred(all, &shift);
+        let triangle = self.centered(all, &shift);
         self.shift = shift;
         Ok(triangle)
     }
 
     /// The triangle of the rows, block after block (sequential TSQR: Demmel, Grigori, Hoemmen and
     /// Langou, Communication-optimal parallel and sequential QR, 2012). Eliminating the column of
-    /// ones first centres the rest.
+    /// ones first centers the rest.
     fn stacked(&mut self, shift: &[f64]) -> Result<QrFactor<f64>> {
         let (neurons, outputs) = (self.neurons(), self.outputs());
         let columns = usize::from(self.frame.intercept) + neurons;
@@ -331,7 +331,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     }
 
     /// Without the column of ones, the means taken from its row.
-    fn centred(
+    fn centered(
         &self,
         all: QrFactor<f64>,
         shift: &[f64],
@@ -350,7 +350,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
             let target_mean = &qtb.row(0) / ones + &Array1::from(target_shift.to_vec());
             r = r.slice(s![1.., 1..]).to_owned();
             qtb = qtb.slice(s![1.., ..]).to_owned();
-            // What centring leaves of a constant is rounding, and would pass for a feature.
+            // What centering leaves of a constant is rounding, and would pass for a feature.
             let constant = |left: f64, mean: f64| {
                 left.sqrt() <= 4.0 * f64::EPSILON * mean.abs() * frame.total_weight.sqrt()
             };
@@ -426,19 +426,19 @@ impl Stack {
                 .assign(&targets.slice(s![from.clone(), ..]));
             (first, self.filled) = (from.end, to.end);
             if self.filled == self.hidden.nrows() {
-                self.factorise()?;
+                self.factorize()?;
             }
         }
         Ok(())
     }
 
-    fn factorise(&mut self) -> Result<()> {
+    fn factorize(&mut self) -> Result<()> {
         let rows = s![..self.filled, ..];
         let QrFactor {
             r,
             qtb,
             residual_ss,
-        } = f64::triangularise(self.hidden.slice(rows), self.targets.slice(rows))?;
+        } = f64::triangularize(self.hidden.slice(rows), self.targets.slice(rows))?;
         self.filled = r.nrows();
         let top = s![..self.filled, ..];
         self.hidden.slice_mut(top).assign(&r);
@@ -448,7 +448,7 @@ impl Stack {
     }
 
     fn finish(mut self) -> Result<QrFactor<f64>> {
-        self.factorise()?;
+        self.factorize()?;
         let top = s![..self.filled, ..];
         Ok(QrFactor {
             r: self.hidden.slice(top).to_owned(),

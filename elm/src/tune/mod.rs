@@ -1,9 +1,9 @@
-//! Chooses the scale of the random weights, the number of neurons and the regularisation.
+//! Chooses the scale of the random weights, the number of neurons and the regularization.
 //!
 //! What decides how good an extreme learning machine is, is the scale of its random weights: too
 //! small and every neuron is a straight line, too large and every neuron is a step. It cannot be
-//! had from a formula, but it can be had from held-out errors, which cost one factorisation each
-//! (see [`validate`](crate::validate)). A [`Tuner`] searches within a budget of them:
+//! had from a formula, but it can be had from held-out errors, which cost one factorization each
+//! (see [`cross_validation`](crate::cross_validation)). A [`Tuner`] searches within a budget of them:
 //!
 //! 1. a coarse grid of scales, a factor of $\sqrt{10}$ apart, then smaller and smaller steps, with the
 //!    neurons given or a hundred;
@@ -27,45 +27,48 @@
 //! A trial looks at 2000 rows at most. With `auto` nearly all trials are of a hundred neurons, some
 //! ten milliseconds each; at most nine are of more.
 //!
-//! The regularisation is chosen by leave-one-out within each trial. Every trial, and with it the
+//! The regularization is chosen by leave-one-out within each trial. Every trial, and with it the
 //! way to the choice, is in [`Tuned::trials`]. Because the error of the winner was used to choose
 //! it, it is a little too good; judge the model on rows that the tuner has not seen.
 //!
 //! ```
-//! use elm::ElmParams;
+//! use elm::{Dataset, ElmParams};
 //! use ndarray::{Array1, Axis};
 //!
 //! let x = Array1::linspace(-10.0, 10.0, 200).insert_axis(Axis(1));
-//! let t = x.mapv(|x: f64| x.sin() / x);
-//! let tuned = ElmParams::auto().tune(&x, &t)?;
+//! let t = x.column(0).mapv(|x: f64| x.sin() / x);
+//! let tuned = ElmParams::auto().tune(&Dataset::new(&x, &t)?)?;
 //! println!("{} neurons, scale {:.2}", tuned.best.neurons, tuned.best.scale);
 //! assert!(tuned.best.score < 1e-3);
 //! let y = tuned.model.predict(&x)?;
-//! # assert_eq!(y.dim(), (200, 1));
+//! # assert_eq!(y.dim(), 200);
 //! # Ok::<(), elm::Error>(())
 //! ```
 
+mod rows;
 mod search;
 
-use ndarray::ArrayRef2;
+use ndarray::Ix2;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::activation::Activation;
-use crate::check::{check_length, check_matrix};
+use crate::dataset::{Dataset, Inputs, TargetDim, Targets};
 use crate::error::{Error, Result};
 use crate::feature_map::Biases;
-use crate::model::{ElmParams, Targets};
+use crate::model::ElmParams;
 use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::solve::Ridge;
 use search::Search;
 
 /// The held-out error that a [`Tuner`] makes small.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Criterion {
-    /// Exact leave-one-out.
+    /// Exact leave-one-out; of rows that have groups, leave-one-group-out.
     #[default]
     LeaveOneOut,
     /// Exact k-fold with this many folds: less optimistic where neighbouring rows are near-copies
@@ -74,27 +77,28 @@ pub enum Criterion {
 }
 
 /// One setting that was tried.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Trial {
     /// Number of hidden neurons.
     pub neurons: usize,
     /// Scale of the random weights.
-    #[serde(serialize_with = "crate::numbers::finite")]
+    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::numbers::finite"))]
     pub scale: f64,
     /// Scale of each input on top of it; empty where all are 1.
     pub input_scales: Vec<f64>,
     /// Whether inputs reach the outputs directly, too.
     pub direct_links: bool,
     /// Held-out RMSE relative to the targets' standard deviation, root mean square over outputs.
-    #[serde(with = "crate::numbers::score")]
+    #[cfg_attr(feature = "serde", serde(with = "crate::numbers::score"))]
     pub score: f64,
 }
 
 /// What a [`Tuner`] found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Tuned<A: Scalar> {
+pub struct Tuned<A: Scalar, D: TargetDim = Ix2> {
     /// The network with the best setting, fitted to all rows.
-    pub model: Elm<A>,
+    pub model: Elm<A, D>,
     /// The settings of that network, to fit others alike.
     pub params: ElmParams<A>,
     /// The best trial.
@@ -109,11 +113,11 @@ pub struct Tuned<A: Scalar> {
 ///
 /// | name | default | purpose | range |
 /// |---|---|---|---|
-/// | [`budget`](Self::budget) | 24; 60 for `auto` | factorisations to spend on the search | at least 1 |
-/// | [`criterion`](Self::criterion) | leave-one-out | the error that is made small | at least 2 folds |
-/// | [`max_neurons`](Self::max_neurons) | 1000; fewer above 4000 rows | where doubling ends when the number is not given | at least 1 |
-/// | [`search_rows`](Self::search_rows) | 2000 | rows that the search looks at, drawn at random | at least 2 |
-/// | [`per_input`](Self::per_input) | off; on for `auto` | whether each input gets its own scale | |
+/// | [`budget`](Self::with_budget) | 24; 60 for `auto` | factorizations to spend on the search | at least 1 |
+/// | [`criterion`](Self::with_criterion) | leave-one-out | the error that is made small | at least 2 folds |
+/// | [`max_neurons`](Self::with_max_neurons) | 1000; fewer above 4000 rows | where doubling ends when the number is not given | at least 1 |
+/// | [`search_rows`](Self::with_search_rows) | 2000 | rows that the search looks at, drawn at random | at least 2 |
+/// | [`per_input`](Self::with_per_input) | off; on for `auto` | whether each input gets a scale of its own | |
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tuner<A: Scalar> {
     base: ElmParams<A>,
@@ -130,13 +134,13 @@ pub struct Tuner<A: Scalar> {
 }
 
 impl<A: Scalar> ElmParams<A> {
-    /// Chooses everything: neurons, weight scale, a scale per input, direct links and
-    /// regularisation, for tanh neurons with their biases on the data, within 60 factorisations.
+    /// Chooses everything: neurons, weight scale, a scale per input, direct links and regularization, for tanh
+    /// neurons with their biases on the data, within 60 factorizations.
     #[must_use]
     pub fn auto() -> Tuner<A> {
         let base = Self::new(1)
-            .activation(Activation::Tanh)
-            .biases(Biases::OnData);
+            .with_activation(Activation::Tanh)
+            .with_biases(Biases::AtTrainingRows);
         Tuner {
             neurons: None,
             per_input: true,
@@ -146,7 +150,7 @@ impl<A: Scalar> ElmParams<A> {
         }
     }
 
-    /// Chooses weight scale and regularisation, and keeps all other settings.
+    /// Chooses weight scale and regularization, and keeps all other settings.
     #[must_use]
     pub fn tuner(self) -> Tuner<A> {
         Tuner {
@@ -163,78 +167,116 @@ impl<A: Scalar> ElmParams<A> {
 }
 
 impl<A: Scalar> Tuner<A> {
-    /// How many factorisations the search may spend; the final fit comes on top.
+    /// How many factorizations the search may spend; the final fit comes on top.
     #[must_use]
-    pub fn budget(mut self, factorisations: usize) -> Self {
-        self.budget = factorisations;
+    pub fn with_budget(mut self, factorizations: usize) -> Self {
+        self.budget = factorizations;
+        self
+    }
+
+    /// How many factorizations the search may spend.
+    #[must_use]
+    pub fn budget(&self) -> usize {
+        self.budget
+    }
+
+    /// The held-out error that is made small.
+    #[must_use]
+    #[doc(alias = "cv")]
+    pub fn with_criterion(mut self, criterion: Criterion) -> Self {
+        self.criterion = criterion;
         self
     }
 
     /// The held-out error that is made small.
     #[must_use]
-    pub fn criterion(mut self, criterion: Criterion) -> Self {
-        self.criterion = criterion;
-        self
+    pub fn criterion(&self) -> Criterion {
+        self.criterion
     }
 
     /// The largest number of neurons that is chosen. Unless it is set, 1000; or, where there are more
     /// than 4000 rows, as many as keep rows times neurons squared, which the final fit's time goes
     /// by, at 4e9, but at least 200.
     #[must_use]
-    pub fn max_neurons(mut self, neurons: usize) -> Self {
+    pub fn with_max_neurons(mut self, neurons: usize) -> Self {
         self.max_neurons = Some(neurons);
         self
     }
 
+    /// The largest number of neurons that is chosen, where it is set.
+    #[must_use]
+    pub fn max_neurons(&self) -> Option<usize> {
+        self.max_neurons
+    }
+
     /// How many rows the search looks at. The final fit uses all.
     #[must_use]
-    pub fn search_rows(mut self, rows: usize) -> Self {
+    pub fn with_search_rows(mut self, rows: usize) -> Self {
         self.search_rows = rows;
         self
     }
 
-    /// Whether each input gets its own scale.
+    /// How many rows the search looks at.
     #[must_use]
-    pub fn per_input(mut self, per_input: bool) -> Self {
+    pub fn search_rows(&self) -> usize {
+        self.search_rows
+    }
+
+    /// Whether each input gets a scale of its own.
+    #[must_use]
+    pub fn with_per_input(mut self, per_input: bool) -> Self {
         self.per_input = per_input;
         self
     }
 
+    /// Whether each input gets a scale of its own.
+    #[must_use]
+    pub fn per_input(&self) -> bool {
+        self.per_input
+    }
+
     /// Seeds the random layer, and the choice of rows and folds for the search.
     #[must_use]
-    pub fn seed(mut self, seed: u64) -> Self {
-        self.base = self.base.seed(seed);
+    #[doc(alias = "random_state")]
+    pub fn with_seed(mut self, seed: u64) -> Self {
+        self.base = self.base.with_seed(seed);
         self
+    }
+
+    /// The seed of the random layer and of the search.
+    #[must_use]
+    pub fn seed(&self) -> u64 {
+        self.base.seed()
     }
 
     /// Searches, and fits the best setting to all rows: [`tune`](Self::tune) without the path.
     ///
     /// # Errors
-    /// Those of [`tune`](Self::tune).
-    pub fn fit<T: Targets<A>>(&self, x: &ArrayRef2<A>, t: &T) -> Result<Elm<A>> {
-        Ok(self.tune(x, t)?.model)
+    /// Those of [`Dataset::new`] and [`tune`](Self::tune).
+    pub fn fit<X, T>(&self, x: &X, t: &T) -> Result<Elm<A, T::Dim>>
+    where
+        X: Inputs<A> + ?Sized,
+        T: Targets<A> + ?Sized,
+    {
+        Ok(self.tune(&Dataset::new(x, t)?)?.model)
     }
 
-    /// Searches, and fits the best setting to all rows.
+    /// Searches, and fits the best setting to all rows. Whatever solver was set, ridge by leave-one-out
+    /// is used.
     ///
-    /// `x` has shape (rows, inputs); `t` has shape (rows, outputs), or (rows) for one output.
-    /// Whatever solver was set, ridge by leave-one-out is used.
+    /// Weights of rows count in errors as they do in fits. Rows of one group are held out together, by
+    /// both [criteria](Criterion).
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a setting out of range, and those of [`CheckedParams::fit`].
-    ///
-    /// [`CheckedParams::fit`]: crate::CheckedParams::fit
-    pub fn tune<T: Targets<A>>(&self, x: &ArrayRef2<A>, t: &T) -> Result<Tuned<A>> {
+    /// [`Error::Parameter`] for a setting out of range, and those of [`ElmParams::fit_dataset`].
+    #[doc(alias = "GridSearchCV")]
+    pub fn tune<D: TargetDim>(&self, data: &Dataset<'_, A, D>) -> Result<Tuned<A, D>> {
         self.check()?;
-        let (x, t) = (x.view(), t.as_matrix());
-        check_matrix("inputs", x)?;
-        check_matrix("targets", t)?;
-        check_length("rows of targets", t.nrows(), x.nrows())?;
-        let mut search = Search::new(self, x, t)?;
+        let mut search = Search::new(self, data)?;
         search.run()?;
         let (best, trials) = search.finish()?;
         let params = self.params(&best);
-        let model = params.fit(&x, &t)?;
+        let model = params.fit_dataset(data)?;
         Ok(Tuned {
             model,
             params,
@@ -283,9 +325,9 @@ impl<A: Scalar> Tuner<A> {
         self.base
             .clone()
             .with_neurons(trial.neurons)
-            .scale(trial.scale)
-            .input_scales(trial.input_scales.clone())
-            .direct_links(trial.direct_links)
-            .solver(Ridge::leave_one_out())
+            .with_scale(trial.scale)
+            .with_input_scales(trial.input_scales.clone())
+            .with_direct_links(trial.direct_links)
+            .with_solver(Ridge::leave_one_out())
     }
 }

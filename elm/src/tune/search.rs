@@ -1,15 +1,13 @@
 //! The tuner's search: fits candidates, and decides which to try next.
 
-use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
-use rand::seq::index;
+use ndarray::{Array1, Array2, ArrayView2, Axis, Ix2};
 
-use super::{Criterion, Trial, Tuner};
+use super::rows::{chosen_rows, deviation, folds};
+use super::{Trial, Tuner};
+use crate::dataset::{Dataset, Rows, TargetDim};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 use crate::solve::Ridge;
-use crate::stats::Moments;
-use crate::stream::Stream;
-use crate::validate::assign_folds;
 
 /// Neurons that the search uses as long as their number is not chosen.
 const SEARCH_NEURONS: usize = 100;
@@ -17,21 +15,22 @@ const SEARCH_NEURONS: usize = 100;
 const MIN_GAIN: f64 = 0.01;
 /// Coarse steps of the scale: half a decade.
 const COARSE: f64 = 0.5;
-/// What a held-out error at a scale below the centre counts more for, for each decade.
+/// What a held-out error at a scale below the center counts more for, for each decade.
 const PER_DECADE: f64 = 0.06;
-/// Steps of the scale below this (in decades) make no difference worth a factorisation.
-const FINEST: f64 = 0.1;
-/// Factorisations that are kept for choosing the number of neurons, where that is to be chosen.
+/// Steps of the scale below this (in decades) make no difference worth a factorization.
+const MIN_STEP: f64 = 0.1;
+/// Factorizations that are kept for choosing the number of neurons, where that is to be chosen.
 const FOR_NEURONS: usize = 9;
 /// The smallest scale of an input relative to the largest when slopes decide.
-const LEAST_RELEVANCE: f64 = 0.01;
+const MIN_RELEVANCE: f64 = 0.01;
 /// Rows at which slopes are taken.
 const SLOPE_ROWS: usize = 500;
 
 /// A trial, with the held-out error of each row.
 struct Attempt {
     trial: Trial,
-    /// Squared, relative to each output's variance, mean over outputs.
+    /// Squared, relative to each output's variance, mean over outputs; times the weight of the row over
+    /// the mean weight.
     squares: Vec<f64>,
     /// What the score counts for, over what it is: above 1 for small scales.
     price: f64,
@@ -63,6 +62,8 @@ pub(super) struct Search<'a, A: Scalar> {
     tuner: &'a Tuner<A>,
     x: Array2<A>,
     t: Array2<A>,
+    /// Of the rows, all positive, where they have any.
+    weights: Option<Array1<A>>,
     /// Standard deviation of each output, 1 for a constant one.
     spread: Vec<f64>,
     folds: Option<Vec<usize>>,
@@ -71,7 +72,7 @@ pub(super) struct Search<'a, A: Scalar> {
     current: usize,
     /// Bounds of the scale's exponent: beyond, every neuron is a straight line or a step.
     exponents: (f64, f64),
-    /// Factorisations so far, and how many there may be for now.
+    /// Factorizations so far, and how many there may be for now.
     spent: usize,
     limit: usize,
     /// Where doubling ends.
@@ -83,42 +84,57 @@ pub(super) struct Search<'a, A: Scalar> {
 }
 
 impl<'a, A: Scalar> Search<'a, A> {
-    pub(super) fn new(
-        tuner: &'a Tuner<A>,
-        x: ArrayView2<'_, A>,
-        t: ArrayView2<'_, A>,
-    ) -> Result<Self> {
+    pub(super) fn new<D: TargetDim>(tuner: &'a Tuner<A>, data: &Dataset<'_, A, D>) -> Result<Self> {
+        // Some rows, and weights that are not all 0.
+        drop(Rows::new(data)?);
+        let (x, t) = (data.inputs(), data.target_matrix());
+        let chosen = chosen_rows(tuner, data);
+        let select = |matrix: ArrayView2<'_, A>| match &chosen {
+            Some(rows) => matrix.select(Axis(0), rows),
+            None => matrix.to_owned(),
+        };
+        let weights = data.weights().map(|weights| match &chosen {
+            Some(rows) => weights.select(Axis(0), rows),
+            None => weights.to_owned(),
+        });
+        let groups: Option<Vec<usize>> = data.groups().map(|groups| match &chosen {
+            Some(rows) => rows.iter().map(|&row| groups[row]).collect(),
+            None => groups.to_vec(),
+        });
         let most = tuner.most_neurons(x.nrows());
-        let rows = tuner.search_rows.min(x.nrows());
-        let (x, t) = if rows < x.nrows() {
-            let mut random = Stream::SearchRows.of(tuner.base.get_seed());
-            let mut chosen = index::sample(&mut random, x.nrows(), rows).into_vec();
-            chosen.sort_unstable();
-            (x.select(Axis(0), &chosen), t.select(Axis(0), &chosen))
-        } else {
-            (x.to_owned(), t.to_owned())
-        };
-        let folds = match tuner.criterion {
-            Criterion::LeaveOneOut => None,
-            Criterion::KFold(folds) => Some(assign_folds(rows, folds, tuner.base.get_seed())?),
-        };
-        // A weighted sum of standardised inputs has a deviation of about 1 at this scale.
-        let centre = -(x.ncols() as f64).log10() / 2.0;
+        let (x, t) = (select(x), select(t));
+        let folds = folds(tuner, &x, &t, groups)?;
+        // A weighted sum of standardized inputs has a deviation of about 1 at this scale.
+        let center = -(x.ncols() as f64).log10() / 2.0;
         Ok(Self {
             tuner,
-            spread: t.columns().into_iter().map(deviation).collect(),
+            spread: t
+                .columns()
+                .into_iter()
+                .map(|column| deviation(column, weights.as_ref().map(|weights| weights.view())))
+                .collect(),
             x,
             t,
+            weights,
             folds,
             attempts: Vec::new(),
             current: 0,
-            exponents: (centre - 3.0 * COARSE, centre + 3.0 * COARSE),
+            exponents: (center - 3.0 * COARSE, center + 3.0 * COARSE),
             spent: 0,
             limit: tuner.budget,
             most,
             steepness: None,
-            links: tuner.base.links_directly(),
+            links: tuner.base.direct_links(),
         })
+    }
+
+    /// The rows that the search looks at.
+    fn data(&self) -> Result<Dataset<'_, A, Ix2>> {
+        let data = Dataset::new(&self.x, &self.t)?;
+        match &self.weights {
+            Some(weights) => data.with_weights(weights),
+            None => Ok(data),
+        }
     }
 
     /// The best trial, and all.
@@ -138,13 +154,13 @@ impl<'a, A: Scalar> Search<'a, A> {
         if self.tuner.neurons.is_none() {
             self.limit = budget - FOR_NEURONS.min(budget / 4);
         }
-        let centre = (self.exponents.0 + self.exponents.1) / 2.0;
+        let center = (self.exponents.0 + self.exponents.1) / 2.0;
         // From the middle outwards, so that a small budget is spent well.
         for step in [0, 1, -1, 2, -2, 3, -3] {
-            let exponent = centre + COARSE * f64::from(step);
+            let exponent = center + COARSE * f64::from(step);
             self.move_if(neurons, exponent, &[], scale_pays)?;
         }
-        self.refine_scale(COARSE / 2.0, FINEST)?;
+        self.refine_scale(COARSE / 2.0, MIN_STEP)?;
         if self.tuner.per_input && self.x.ncols() > 1 {
             self.follow_slopes()?;
             self.choose_input_scales()?;
@@ -192,7 +208,7 @@ impl<'a, A: Scalar> Search<'a, A> {
             }
         }
         if self.now().is_some_and(|now| now.neurons != start.neurons) {
-            // More neurons can carry steeper ones. No finer: these factorisations are the dear ones.
+            // More neurons can carry steeper ones. No finer: these factorizations are the dear ones.
             self.refine_scale(COARSE / 2.0, COARSE / 2.0)?;
         }
         Ok(())
@@ -228,7 +244,7 @@ impl<'a, A: Scalar> Search<'a, A> {
             if !moved {
                 break;
             }
-            self.refine_scale(COARSE / 2.0, FINEST)?;
+            self.refine_scale(COARSE / 2.0, MIN_STEP)?;
         }
         Ok(())
     }
@@ -237,7 +253,7 @@ impl<'a, A: Scalar> Search<'a, A> {
     /// makes of the input; nothing where there are none.
     fn slopes(&mut self, trial: &Trial) -> Result<Option<Vec<f64>>> {
         self.spent += 1;
-        let model = self.tuner.params(trial).fit(&self.x, &self.t)?;
+        let model = self.tuner.params(trial).fit_dataset(&self.data()?)?;
         let every = self.x.nrows().div_ceil(SLOPE_ROWS).max(1);
         let rows = self.x.slice(ndarray::s![..;every, ..]).to_owned();
         let mut squares = vec![0.0; self.x.ncols()];
@@ -287,7 +303,7 @@ impl<'a, A: Scalar> Search<'a, A> {
             order.sort_by(|&a, &b| slopes[b].total_cmp(&slopes[a]));
         }
         let mut step = 2.0 * COARSE;
-        while step >= FINEST && !self.is_spent() {
+        while step >= MIN_STEP && !self.is_spent() {
             let mut moved = false;
             for &input in &order {
                 for direction in [-1.0, 1.0] {
@@ -354,8 +370,8 @@ impl<'a, A: Scalar> Search<'a, A> {
     /// What a score counts for at a scale, over what it is: small scales make networks that are
     /// nearly polynomials, with large output weights that cancel among the rows and nowhere else.
     fn price(&self, scale: f64) -> f64 {
-        let centre = (self.exponents.0 + self.exponents.1) / 2.0;
-        (1.0 + PER_DECADE).powf((centre - scale.log10()).max(0.0))
+        let center = (self.exponents.0 + self.exponents.1) / 2.0;
+        (1.0 + PER_DECADE).powf((center - scale.log10()).max(0.0))
     }
 
     fn attempt(&self, neurons: usize, scale: f64, scales: &[f64]) -> Result<Attempt> {
@@ -366,9 +382,8 @@ impl<'a, A: Scalar> Search<'a, A> {
             direct_links: self.links,
             score: f64::INFINITY,
         };
-        let params = self.tuner.params(&trial).check()?;
-        let validator = params.validator(self.x.view(), self.t.view())?;
-        let lambda = validator.strengths(Ridge::leave_one_out())?;
+        let validator = self.tuner.params(&trial).validator(&self.data()?)?;
+        let lambda = validator.select_lambda(Ridge::leave_one_out())?;
         let held_out = match &self.folds {
             Some(folds) => validator.k_fold(folds, &lambda),
             None => validator.leave_one_out(&lambda),
@@ -386,7 +401,7 @@ impl<'a, A: Scalar> Search<'a, A> {
             Err(error) => return Err(error),
         };
         let outputs = self.spread.len() as f64;
-        let squares: Vec<f64> = held_out
+        let mut squares: Vec<f64> = held_out
             .residuals()
             .rows()
             .into_iter()
@@ -398,6 +413,12 @@ impl<'a, A: Scalar> Search<'a, A> {
                 relative.sum::<f64>() / outputs
             })
             .collect();
+        if let Some(weights) = &self.weights {
+            let mean = weights.iter().map(|w| w.as_f64()).sum::<f64>() / weights.len() as f64;
+            for (square, weight) in squares.iter_mut().zip(weights) {
+                *square *= weight.as_f64() / mean;
+            }
+        }
         trial.score = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
         let price = self.price(scale);
         Ok(Attempt {
@@ -431,15 +452,8 @@ fn proportional(slopes: &[f64], power: f64) -> Vec<f64> {
     let largest = slopes.iter().copied().fold(0.0, f64::max);
     let relative = slopes
         .iter()
-        .map(|s| (s / largest).max(LEAST_RELEVANCE).powf(power));
+        .map(|s| (s / largest).max(MIN_RELEVANCE).powf(power));
     let relative: Vec<f64> = relative.collect();
     let mean_square = relative.iter().map(|s| s * s).sum::<f64>() / relative.len() as f64;
     relative.iter().map(|s| s / mean_square.sqrt()).collect()
-}
-
-/// The standard deviation, or 1 for a constant.
-fn deviation<A: Scalar>(column: ArrayView1<'_, A>) -> f64 {
-    let moments = Moments::of(column.insert_axis(Axis(1)), None);
-    let deviation = moments.deviations().next();
-    deviation.filter(|d| *d > 0.0).unwrap_or(1.0)
 }

@@ -2,7 +2,7 @@
 
 use crate::common::{amplification, frobenius, normal, weights};
 use elm::solve::{Inverse, PseudoInverse, Ridge, Solver};
-use elm::{Accumulator, Biases, CheckedParams, Elm, ElmParams, Error, Scalar, Scaler};
+use elm::{Accumulator, Biases, Dataset, Elm, ElmParams, Error, Scalar, Scaler};
 use ndarray::{Array1, Array2, Axis, array, s};
 
 fn data<A: Scalar>(rows: usize, seed: u64) -> (Array2<A>, Array2<A>) {
@@ -17,7 +17,7 @@ fn data<A: Scalar>(rows: usize, seed: u64) -> (Array2<A>, Array2<A>) {
 }
 
 fn accumulated<A: Scalar>(
-    params: &CheckedParams<A>,
+    params: &ElmParams<A>,
     x: &Array2<A>,
     t: &Array2<A>,
     chunk: usize,
@@ -57,11 +57,9 @@ fn chunks_of_any_size_give_the_batch_answer() {
     for solver in solvers() {
         for (intercept, links) in [(true, false), (false, true)] {
             let params = ElmParams::new(15)
-                .solver(solver)
-                .intercept(intercept)
-                .direct_links(links)
-                .check()
-                .unwrap();
+                .with_solver(solver)
+                .with_intercept(intercept)
+                .with_direct_links(links);
             let batch = params.fit(&x, &t).unwrap();
             for chunk in [1, 7, 100, 400] {
                 let accumulator = accumulated(&params, &x, &t, chunk);
@@ -81,7 +79,7 @@ fn chunks_of_any_size_give_the_batch_answer() {
 #[test]
 fn the_order_of_rows_and_the_way_of_merging_do_not_matter() {
     let (x, t) = data::<f64>(600, 3);
-    let params = ElmParams::new(12).solver(Ridge::gcv()).check().unwrap();
+    let params = ElmParams::new(12).with_solver(Ridge::gcv());
     let batch = params.fit(&x, &t).unwrap();
     let start = Accumulator::with_scaler(&params, Scaler::measured(&x).unwrap(), 2).unwrap();
     let part = |range: std::ops::Range<usize>| {
@@ -114,10 +112,8 @@ fn the_order_of_rows_and_the_way_of_merging_do_not_matter() {
 fn biases_on_the_data_come_from_the_sample() {
     let (x, t) = data::<f64>(200, 4);
     let params = ElmParams::new(10)
-        .biases(Biases::OnData)
-        .solver(Ridge::gcv())
-        .check()
-        .unwrap();
+        .with_biases(Biases::AtTrainingRows)
+        .with_solver(Ridge::gcv());
     let batch = params.fit(&x, &t).unwrap();
     let mut one = accumulated(&params, &x, &t, 50);
     assert_same_fit(&one.fit().unwrap(), &batch, &x, "one sample");
@@ -125,7 +121,7 @@ fn biases_on_the_data_come_from_the_sample() {
         .unwrap();
     let scaler = Scaler::measured(&x).unwrap();
     assert!(matches!(
-        Accumulator::with_scaler(&params, scaler, 2),
+        <Accumulator<f64>>::with_scaler(&params, scaler, 2),
         Err(Error::Conflict { .. })
     ));
 }
@@ -136,21 +132,24 @@ fn weighted_rows_give_the_weighted_batch_answer() {
     let mut w = weights::<f64>(200, 6);
     w.slice_mut(s![..;3]).fill(0.0);
     for factor in [1.0, 1e-200, 1e200] {
-        let params = ElmParams::new(10)
-            .solver(Ridge::relative(1e-6))
-            .check()
-            .unwrap();
+        let params = ElmParams::new(10).with_solver(Ridge::relative(1e-6));
         let w = &w * factor;
-        let batch = params.fit_weighted(&x, &t, Some(w.view())).unwrap();
+        let batch = params
+            .fit_dataset(&Dataset::new(&x, &t).unwrap().with_weights(&w).unwrap())
+            .unwrap();
         let scaler = Scaler::measured_weighted(&x, &w).unwrap();
         let mut accumulator = Accumulator::with_scaler(&params, scaler, 2).unwrap();
         for start in (0..200).step_by(30) {
             let range = start..200.min(start + 30);
             accumulator
-                .push_weighted(
-                    &x.slice(s![range.clone(), ..]),
-                    &t.slice(s![range.clone(), ..]),
-                    &w.slice(s![range]),
+                .push_dataset(
+                    &Dataset::new(
+                        &x.slice(s![range.clone(), ..]),
+                        &t.slice(s![range.clone(), ..]),
+                    )
+                    .unwrap()
+                    .with_weights(&w.slice(s![range]))
+                    .unwrap(),
                 )
                 .unwrap();
         }
@@ -171,7 +170,7 @@ fn fewer_rows_than_neurons_give_the_batch_answer() {
         Solver::from(PseudoInverse::default()),
         Ridge::relative(1e-4).into(),
     ] {
-        let params = ElmParams::new(30).solver(solver).check().unwrap();
+        let params = ElmParams::new(30).with_solver(solver);
         let batch = params.fit(&x, &t).unwrap();
         for rows in [1, 5] {
             let model = accumulated(&params, &x, &t, rows).fit().unwrap();
@@ -184,7 +183,7 @@ fn fewer_rows_than_neurons_give_the_batch_answer() {
 fn inputs_without_information_are_answered_by_the_mean() {
     let (x, t) = (Array2::from_elem((50, 2), 0.1), normal::<f64>(50, 1, 8));
     for solver in solvers() {
-        let params = ElmParams::new(9).solver(solver).check().unwrap();
+        let params = ElmParams::new(9).with_solver(solver);
         let y = accumulated(&params, &x, &t, 7)
             .fit()
             .unwrap()
@@ -197,10 +196,7 @@ fn inputs_without_information_are_answered_by_the_mean() {
 #[test]
 fn targets_of_any_size_give_the_answer_of_the_batch() {
     let (x, t) = data::<f64>(100, 9);
-    let params = ElmParams::new(10)
-        .solver(Ridge::relative(1e-6))
-        .check()
-        .unwrap();
+    let params = ElmParams::new(10).with_solver(Ridge::relative(1e-6));
     for (first, second) in [(1.0, 1.0), (1e-200, 1.0), (1.0, 1e200), (1e300, 1e300)] {
         let mut t = t.clone();
         t.slice_mut(s![..50, ..]).mapv_inplace(|v| v / 1e3 * first);
@@ -211,9 +207,9 @@ fn targets_of_any_size_give_the_answer_of_the_batch() {
 }
 
 #[test]
-fn leave_one_out_is_replaced_by_generalised_cross_validation() {
+fn leave_one_out_is_replaced_by_generalized_cross_validation() {
     let (x, t) = data::<f64>(150, 10);
-    let params = |ridge: Ridge| ElmParams::new(10).solver(ridge).check().unwrap();
+    let params = |ridge: Ridge| ElmParams::new(10).with_solver(ridge);
     let default = accumulated(&params(Ridge::default()), &x, &t, 40)
         .fit()
         .unwrap();
@@ -227,12 +223,13 @@ fn leave_one_out_is_replaced_by_generalised_cross_validation() {
 #[test]
 fn what_cannot_be_taken_in_is_an_error_and_leaves_no_trace() {
     let (x, t) = data::<f64>(300, 11);
-    let params = ElmParams::new(10).check().unwrap();
+    let params = ElmParams::new(10);
     let mut accumulator = accumulated(&params, &x, &t, 50);
     let before = accumulator.clone();
     let (mut bad_x, mut bad_t) = (x.clone(), t.clone());
     bad_x[[299, 2]] = f64::NAN;
     bad_t[[0, 1]] = f64::INFINITY;
+    let short = Array1::ones(2);
     let place = |what, row, column| Error::NotFinite { what, row, column };
     let shape = |what, expected, found| Error::Shape {
         what,
@@ -249,7 +246,9 @@ fn what_cannot_be_taken_in_is_an_error_and_leaves_no_trace() {
             shape("rows of targets", 300, 9),
         ),
         (
-            accumulator.push_weighted(&x, &t, &Array1::ones(2)),
+            Dataset::new(&x, &t)
+                .and_then(|data| data.with_weights(&short))
+                .and_then(|data| accumulator.push_dataset(&data)),
             shape("row weights", 300, 2),
         ),
     ] {
@@ -261,7 +260,7 @@ fn what_cannot_be_taken_in_is_an_error_and_leaves_no_trace() {
         let w = Array1::from_elem(rows, 1e300);
         let (x, t) = (x.slice(s![..rows, ..]), huge.slice(s![..rows, ..]));
         assert!(matches!(
-            accumulator.push_weighted(&x, &t, &w),
+            accumulator.push_dataset(&Dataset::new(&x, &t).unwrap().with_weights(&w).unwrap()),
             Err(Error::Overflow { .. })
         ));
     }
@@ -276,19 +275,22 @@ fn what_cannot_be_taken_in_is_an_error_and_leaves_no_trace() {
 fn accumulators_of_different_kinds_do_not_merge() {
     let (x, _) = data::<f64>(20, 12);
     let make = |params: ElmParams<f64>, outputs| {
-        Accumulator::from_sample(&params.check().unwrap(), &x, outputs).unwrap()
+        <Accumulator<f64>>::from_sample(&params, &x, outputs).unwrap()
     };
-    let plain = || ElmParams::new(5).solver(Ridge::gcv());
+    let plain = || ElmParams::new(5).with_solver(Ridge::gcv());
     let elsewhere = &x + 1.0;
     let scaler = Scaler::measured(&elsewhere).unwrap();
-    let other = Accumulator::with_scaler(&plain().check().unwrap(), scaler, 2).unwrap();
+    let other = Accumulator::with_scaler(&plain(), scaler, 2).unwrap();
     for (other, what) in [
-        (make(plain().seed(1), 2), "random layers"),
+        (make(plain().with_seed(1), 2), "random layers"),
         (other, "scalers of inputs"),
         (make(plain(), 1), "numbers of outputs"),
-        (make(plain().direct_links(true), 2), "direct links"),
-        (make(plain().intercept(false), 2), "intercepts"),
-        (make(plain().solver(Ridge::relative(0.1)), 2), "solvers"),
+        (make(plain().with_direct_links(true), 2), "direct links"),
+        (make(plain().with_intercept(false), 2), "intercepts"),
+        (
+            make(plain().with_solver(Ridge::relative(0.1)), 2),
+            "solvers",
+        ),
     ] {
         assert_eq!(
             make(plain(), 2).merge(&other),
@@ -300,36 +302,41 @@ fn accumulators_of_different_kinds_do_not_merge() {
 #[test]
 fn what_cannot_be_accumulated_is_an_error() {
     let (x, t) = data::<f64>(20, 13);
-    let check = |params: ElmParams<f64>| params.check().unwrap();
     let scaler = Scaler::measured(&x).unwrap();
-    let inverse = check(ElmParams::new(20).solver(Inverse));
+    let inverse = ElmParams::new(20).with_solver(Inverse);
     assert!(matches!(
-        Accumulator::from_sample(&inverse, &x, 1),
+        <Accumulator<f64>>::from_sample(&inverse, &x, 1),
         Err(Error::Conflict { .. })
     ));
-    let unscaled = check(ElmParams::new(5).standardise(false));
+    let unscaled = ElmParams::new(5).with_standardize(false);
     assert!(matches!(
-        Accumulator::with_scaler(&unscaled, scaler, 1),
+        <Accumulator<f64>>::with_scaler(&unscaled, scaler, 1),
         Err(Error::Conflict { .. })
     ));
-    let params = check(ElmParams::new(5));
+    let params = ElmParams::new(5);
     assert!(matches!(
-        Accumulator::from_sample(&params, &x, 0),
+        <Accumulator<f64>>::from_sample(&params, &x, 0),
         Err(Error::Parameter {
             name: "outputs",
             ..
         })
     ));
     assert!(matches!(
-        Accumulator::from_sample(&check(ElmParams::new(usize::MAX / 8)), &x, 1),
+        <Accumulator<f64>>::from_sample(&ElmParams::new(usize::MAX / 8), &x, 1),
         Err(Error::TooLarge { .. })
     ));
     let mut none = Accumulator::from_sample(&params, &x, 2).unwrap();
     assert!(matches!(none.fit(), Err(Error::Empty { .. })));
-    none.push_weighted(&x, &t, &Array1::zeros(20)).unwrap();
+    none.push_dataset(
+        &Dataset::new(&x, &t)
+            .unwrap()
+            .with_weights(&Array1::zeros(20))
+            .unwrap(),
+    )
+    .unwrap();
     assert!(matches!(none.fit(), Err(Error::Empty { .. })));
     assert!(matches!(
-        params.fit_chunks(std::iter::empty::<Result<_, Error>>()),
+        params.fit_chunks(std::iter::empty::<Result<(Array2<f64>, Array2<f64>), Error>>()),
         Err(Error::Empty { what: "chunks", .. })
     ));
     for (mean, deviation) in [
@@ -345,7 +352,7 @@ fn what_cannot_be_accumulated_is_an_error() {
 #[test]
 fn chunks_from_an_iterator_are_fitted_and_its_error_is_passed_on() {
     let (x, t) = data::<f64>(90, 14);
-    let params = ElmParams::new(8).solver(Ridge::gcv()).check().unwrap();
+    let params = ElmParams::new(8).with_solver(Ridge::gcv());
     let chunk = |i: usize| {
         (
             x.slice(s![i * 30..(i + 1) * 30, ..]).to_owned(),
@@ -377,7 +384,7 @@ fn chunks_from_an_iterator_are_fitted_and_its_error_is_passed_on() {
 #[test]
 fn parts_of_chunks_give_one_answer_on_any_number_of_threads() {
     let (x, t) = data::<f64>(400, 14);
-    let params = ElmParams::new(9).solver(Ridge::gcv()).check().unwrap();
+    let params = ElmParams::new(9).with_solver(Ridge::gcv());
     let chunks = |rows: usize| {
         let pieces = x
             .axis_chunks_iter(Axis(0), rows)
@@ -403,7 +410,7 @@ fn parts_of_chunks_give_one_answer_on_any_number_of_threads() {
         Err(Error::Parameter { name: "parts", .. })
     ));
     assert!(matches!(on(1, 30, usize::MAX), Err(Error::TooLarge { .. })));
-    let nothing = std::iter::empty::<Result<_, Error>>();
+    let nothing = std::iter::empty::<Result<(Array2<f64>, Array2<f64>), Error>>();
     assert!(matches!(
         params.fit_chunks_parallel(nothing, 2),
         Err(Error::Empty { what: "chunks", .. })
@@ -425,9 +432,9 @@ fn parts_of_chunks_give_one_answer_on_any_number_of_threads() {
 }
 
 #[test]
-fn an_accumulator_survives_serialisation() {
+fn an_accumulator_survives_serialization() {
     let (x, t) = data::<f64>(200, 15);
-    let params = ElmParams::new(10).solver(Ridge::gcv()).check().unwrap();
+    let params = ElmParams::new(10).with_solver(Ridge::gcv());
     let accumulator = accumulated(&params, &x, &t, 60);
     let text = serde_json::to_string(&accumulator).unwrap();
     let read: Accumulator<f64> = serde_json::from_str(&text).unwrap();
@@ -443,7 +450,7 @@ fn an_accumulator_survives_serialisation() {
 fn single_precision_accumulates_too() {
     let (x, t) = data::<f32>(300, 16);
     for solver in [Ridge::relative(1e-3), Ridge::gcv()] {
-        let params = ElmParams::new(10).solver(solver).check().unwrap();
+        let params = ElmParams::new(10).with_solver(solver);
         let model = accumulated(&params, &x, &t, 17).fit().unwrap();
         assert_same_fit(&model, &params.fit(&x, &t).unwrap(), &x, "f32");
     }
@@ -452,7 +459,7 @@ fn single_precision_accumulates_too() {
 #[test]
 fn a_damaged_accumulator_is_not_read() {
     let (x, t) = data::<f64>(200, 15);
-    let params = ElmParams::new(4).solver(Ridge::gcv()).check().unwrap();
+    let params = ElmParams::new(4).with_solver(Ridge::gcv());
     let whole = serde_json::to_value(accumulated(&params, &x, &t, 60)).unwrap();
     let read = |value: &serde_json::Value| {
         serde_json::from_value::<Accumulator<f64>>(value.clone()).is_ok()

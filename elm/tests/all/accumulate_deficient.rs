@@ -3,12 +3,12 @@
 
 use crate::common::{amplification, frobenius, normal};
 use elm::solve::{PseudoInverse, Ridge, Solver};
-use elm::{Accumulator, CheckedParams, Elm, ElmParams, Scalar, metrics};
+use elm::{Accumulator, Elm, ElmParams, Scalar, metrics};
 use ndarray::{Array1, Array2, Axis, s};
 use proptest::prelude::*;
 
 fn accumulated<A: Scalar>(
-    params: &CheckedParams<A>,
+    params: &ElmParams<A>,
     x: &Array2<A>,
     t: &Array2<A>,
     chunk: usize,
@@ -57,7 +57,7 @@ fn noisy_sine<A: Scalar>() -> (Array2<A>, Array2<A>, Array2<A>) {
 fn a_noisy_sine_is_accumulated<A: Scalar>() {
     let (x, t, sine) = noisy_sine::<A>();
     for solver in [Solver::default(), Ridge::gcv().into()] {
-        let params = ElmParams::new(50).solver(solver).check().unwrap();
+        let params = ElmParams::new(50).with_solver(solver);
         let batch = rmse(&params.fit(&x, &t).unwrap().predict(&x).unwrap(), &sine);
         for chunk in [200, 30] {
             let model = accumulated(&params, &x, &t, chunk);
@@ -81,7 +81,7 @@ fn more_neurons_than_two_inputs_need_are_accumulated_as_well_as_they_are_fitted(
         .map_axis(Axis(1), |row| (row[0] - row[1] * row[1]).sin())
         .insert_axis(Axis(1));
     let t = &truth + &normal::<f64>(1000, 1, 42).mapv(|v| 0.3 * v);
-    let params = ElmParams::new(200).solver(Ridge::gcv()).check().unwrap();
+    let params = ElmParams::new(200).with_solver(Ridge::gcv());
     let batch = params.fit(&x, &t).unwrap();
     let model = accumulated(&params, &x, &t, 130);
     let error = |model: &Elm<f64>| rmse(&model.predict(&x).unwrap(), &truth);
@@ -124,8 +124,11 @@ fn accumulated_equals_batch<A: Scalar>(
         Ridge::relative(1e-3).into(),
         Ridge::gcv().into(),
     ] {
-        let params = ElmParams::new(40).scale(1.5).solver(solver).seed(seed);
-        let params = params.check().unwrap();
+        let params = ElmParams::new(40)
+            .with_scale(1.5)
+            .with_solver(solver)
+            .with_seed(seed);
+        let params = params;
         let batch = params.fit(&x, &t).unwrap();
         let model = accumulated(&params, &x, &t, chunk);
         let (a, b) = (model.predict(&x).unwrap(), batch.predict(&x).unwrap());
@@ -169,7 +172,7 @@ proptest! {
 fn metrics_of_a_mean_are_those_of_an_accumulated_constant() {
     // One point alone: nothing but the intercept is left.
     let (x, t) = repeated::<f64>(1, 60, 3);
-    let params = ElmParams::new(10).check().unwrap();
+    let params = ElmParams::new(10);
     let y = accumulated(&params, &x, &t, 11).predict(&x).unwrap();
     let error = metrics::rmse(&y.column(0), &means(&x, &t).column(0)).unwrap();
     assert!(error < 1e-14);

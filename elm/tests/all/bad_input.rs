@@ -3,8 +3,8 @@
 
 use crate::common::{Problem, amplification, frobenius, normal};
 use elm::solve::{Inverse, LeastSquares, PseudoInverse, Ridge, Solver};
-use elm::{Activation, Biases, Elm, ElmParams, Error, Result, Scalar};
-use ndarray::{Array1, Array2, array, s};
+use elm::{Activation, Biases, Dataset, Elm, ElmParams, Error, Result, Scalar, TargetDim};
+use ndarray::{Array, Array1, Array2, array, s};
 
 fn solvers() -> [Solver; 5] {
     [
@@ -30,10 +30,10 @@ fn values_that_are_not_finite_are_named_by_row_and_column() {
         for solver in solvers() {
             let mut x = normal::<f64>(5, 2, 1);
             let mut t = normal::<f64>(5, 3, 2);
-            let model = ElmParams::new(5).solver(solver).fit(&x, &t).unwrap();
+            let model = ElmParams::new(5).with_solver(solver).fit(&x, &t).unwrap();
             x[[3, 1]] = bad;
             let place = |what, row, column| Error::NotFinite { what, row, column };
-            let params = ElmParams::new(5).solver(solver);
+            let params = ElmParams::new(5).with_solver(solver);
             expect_error(params.fit(&x, &t), &place("inputs", 3, 1), "inputs");
             expect_error(model.predict(&x), &place("inputs", 3, 1), "prediction");
             x[[3, 1]] = 0.0;
@@ -49,7 +49,7 @@ fn values_that_are_not_finite_are_named_by_row_and_column() {
     let spike = Activation::custom("spike", |z: f64| 1.0 / (z - z));
     expect_error(
         ElmParams::new(4)
-            .activation(spike)
+            .with_activation(spike)
             .fit(&array![[1.0], [2.0]], &array![1.0, 2.0]),
         &Error::NotFinite {
             what: "hidden-layer matrix",
@@ -102,10 +102,10 @@ fn shapes_that_do_not_fit_are_named_with_both_sizes() {
         "a third input",
     );
     assert_eq!(model.predict(&none(0, 2)).unwrap().dim(), (0, 1));
-    let checked = params.check().unwrap();
     let weights = array![1.0, 2.0];
+    let t = normal(4, 1, 3);
     expect_error(
-        checked.fit_weighted(&x, &normal(4, 1, 3), Some(weights.view())),
+        Dataset::new(&x, &t).unwrap().with_weights(&weights),
         &shape("row weights", 4, 2),
         "weights",
     );
@@ -120,9 +120,9 @@ fn row_weights_out_of_range_are_named_with_their_value() {
         (array![f64::INFINITY, 1.0, 1.0], f64::INFINITY),
         (array![0.0, 0.0, 0.0], 0.0),
     ] {
-        let checked = ElmParams::new(2).check().unwrap();
+        let data = Dataset::new(&x, &t).unwrap().with_weights(&weights);
         expect_error(
-            checked.fit_weighted(&x, &t, Some(weights.view())),
+            data.and_then(|data| ElmParams::new(2).fit_dataset(&data)),
             &Error::Parameter {
                 name: "row weight",
                 value,
@@ -138,22 +138,30 @@ fn settings_out_of_range_are_named_with_their_value() {
     let good = || ElmParams::<f64>::new(3);
     for (params, name, value) in [
         (ElmParams::new(0), "neurons", 0.0),
-        (good().scale(0.0), "scale", 0.0),
-        (good().scale(-1.0), "scale", -1.0),
-        (good().scale(f64::NAN), "scale", f64::NAN),
-        (good().scale(f64::INFINITY), "scale", f64::INFINITY),
-        (good().biases(Biases::Scaled(-0.5)), "biases", -0.5),
-        (good().biases(Biases::Scaled(f64::NAN)), "biases", f64::NAN),
-        (good().solver(Ridge::relative(0.0)), "lambda", 0.0),
-        (good().solver(Ridge::relative(-1.0)), "lambda", -1.0),
-        (good().solver(Ridge::relative(f64::NAN)), "lambda", f64::NAN),
+        (good().with_scale(0.0), "scale", 0.0),
+        (good().with_scale(-1.0), "scale", -1.0),
+        (good().with_scale(f64::NAN), "scale", f64::NAN),
+        (good().with_scale(f64::INFINITY), "scale", f64::INFINITY),
+        (good().with_biases(Biases::Scaled(-0.5)), "biases", -0.5),
         (
-            good().solver(PseudoInverse::with_cutoff(1.0)),
+            good().with_biases(Biases::Scaled(f64::NAN)),
+            "biases",
+            f64::NAN,
+        ),
+        (good().with_solver(Ridge::relative(0.0)), "lambda", 0.0),
+        (good().with_solver(Ridge::relative(-1.0)), "lambda", -1.0),
+        (
+            good().with_solver(Ridge::relative(f64::NAN)),
+            "lambda",
+            f64::NAN,
+        ),
+        (
+            good().with_solver(PseudoInverse::with_cutoff(1.0)),
             "cutoff",
             1.0,
         ),
         (
-            good().solver(PseudoInverse::with_cutoff(f64::NAN)),
+            good().with_solver(PseudoInverse::with_cutoff(f64::NAN)),
             "cutoff",
             f64::NAN,
         ),
@@ -209,10 +217,10 @@ fn equation_10_refuses_what_it_cannot_answer() {
     let (h, t) = (Array2::<f64>::eye(2), array![[1.0], [2.0]]);
     let weights = array![1.0, 2.0];
     for problem in [
-        LeastSquares::new(&h, &t).unwrap().intercept(true),
+        LeastSquares::new(&h, &t).unwrap().with_intercept(true),
         LeastSquares::new(&h, &t)
             .unwrap()
-            .weights(&weights)
+            .with_weights(&weights)
             .unwrap(),
     ] {
         assert!(matches!(
@@ -223,7 +231,11 @@ fn equation_10_refuses_what_it_cannot_answer() {
 }
 
 /// Whatever was fitted is finite, and so is what it reports.
-fn assert_sound<A: Scalar>(model: &Elm<A>, x: &Array2<A>, what: &str) -> Array2<A> {
+fn assert_sound<A: Scalar, D: TargetDim>(
+    model: &Elm<A, D>,
+    x: &Array2<A>,
+    what: &str,
+) -> Array<A, D> {
     let d = model.diagnosis();
     let numbers = [
         d.condition.unwrap_or(1.0),
@@ -270,7 +282,7 @@ fn unusual_shapes_and_columns_are_fitted() {
             for solver in solvers() {
                 for neurons in [1, 7, 50] {
                     let what = format!("{name}, {solver}, {neurons}");
-                    match ElmParams::new(neurons).solver(solver).fit(x, &t) {
+                    match ElmParams::new(neurons).with_solver(solver).fit(x, &t) {
                         Ok(model) => {
                             assert_sound(&model, x, &what);
                         }
@@ -291,10 +303,10 @@ fn inputs_without_information_are_answered_by_the_mean() {
     let t = array![[1.0, -5.0], [2.0, 0.0], [6.0, 2.0]];
     for x in [Array2::zeros((3, 2)), Array2::from_elem((3, 2), 0.1)] {
         for solver in &solvers()[1..] {
-            for standardise in [true, false] {
+            for standardize in [true, false] {
                 let model = ElmParams::new(9)
-                    .solver(*solver)
-                    .standardise(standardise)
+                    .with_solver(*solver)
+                    .with_standardize(standardize)
                     .fit(&x, &t)
                     .unwrap();
                 let y = assert_sound(&model, &x, "constant inputs");
@@ -314,7 +326,7 @@ fn constant_targets_are_predicted_exactly() {
     for constant in [0.0, 0.1, -3e200, 5e-320] {
         let t = Array1::from_elem(30, constant);
         for solver in &solvers()[1..] {
-            let model = ElmParams::new(9).solver(*solver).fit(&x, &t).unwrap();
+            let model = ElmParams::new(9).with_solver(*solver).fit(&x, &t).unwrap();
             for y in assert_sound(&model, &x, "constant targets") {
                 // The mean of 30 equal numbers, and its correction, round.
                 assert!((y - constant).abs() <= 4.0 * f64::EPSILON * constant.abs());
@@ -323,13 +335,13 @@ fn constant_targets_are_predicted_exactly() {
     }
 }
 
-/// Multiplying inputs (standardised) and targets by any power of ten changes the fit by rounding
+/// Multiplying inputs (standardized) and targets by any power of ten changes the fit by rounding
 /// only, up to the ends of the range.
 #[test]
 fn values_from_one_end_of_the_range_to_the_other_give_the_same_fit() {
     let (x, t) = (normal::<f64>(40, 2, 1), normal::<f64>(40, 2, 2));
     for solver in &solvers()[1..] {
-        let params = ElmParams::new(10).solver(*solver);
+        let params = ElmParams::new(10).with_solver(*solver);
         let y = params.fit(&x, &t).unwrap().predict(&x).unwrap();
         for power in [-300, -200, -20, 20, 200, 300] {
             let factor = 10.0_f64.powi(power);
@@ -416,8 +428,8 @@ fn what_overflows_says_so() {
     // Ten times further out than a slope of 1e307 reaches.
     let x = array![[0.0], [1.0], [2.0]];
     let model = ElmParams::new(3)
-        .activation(Activation::Linear)
-        .bounded(false)
+        .with_activation(Activation::Linear)
+        .with_bounded(false)
         .fit(&x, &x.mapv(|x| x * 1e307))
         .unwrap();
     assert!(matches!(
@@ -430,7 +442,7 @@ fn what_overflows_says_so() {
 fn single_precision_has_the_same_answers_at_the_ends_of_its_range() {
     let (x, t) = (normal::<f32>(40, 2, 1), normal::<f32>(40, 1, 2));
     for solver in &solvers()[1..] {
-        let params = ElmParams::new(8).solver(*solver);
+        let params = ElmParams::new(8).with_solver(*solver);
         let y = params.fit(&x, &t).unwrap().predict(&x).unwrap();
         for power in [-36, -20, 20, 36] {
             let factor = 10.0_f32.powi(power);
@@ -446,7 +458,7 @@ fn single_precision_has_the_same_answers_at_the_ends_of_its_range() {
 
 #[test]
 fn a_student_t_distribution_needs_a_degree_of_freedom() {
-    let params = ElmParams::<f64>::new(3).distribution(elm::Distribution::StudentT(0));
+    let params = ElmParams::<f64>::new(3).with_distribution(elm::Distribution::StudentT(0));
     assert!(matches!(
         params.check(),
         Err(Error::Parameter {

@@ -3,8 +3,8 @@
 use crate::common::normal;
 use elm::bounds::MARGIN;
 use elm::solve::Ridge;
-use elm::{Accumulator, Elm, ElmParams, Error, Scalar, metrics, persist, prune::Keep};
-use ndarray::{Array1, Array2, Axis, array, s};
+use elm::{Accumulator, Dataset, Elm, ElmParams, Error, Scalar, metrics, persist, prune::Keep};
+use ndarray::{Array1, Array2, Axis, Ix1, array, s};
 use ndarray_rand::RandomExt;
 use ndarray_rand::rand_distr::Uniform;
 use rand::SeedableRng;
@@ -53,7 +53,7 @@ fn a_default_model_does_not_explode_outside_the_data() {
         for stretch in [1.2, 1.5] {
             let stretched = test.mapv(|x| x * stretch);
             let y = model.predict(&stretched).unwrap();
-            let error = metrics::rmse(&y.column(0), &wave(&stretched)).unwrap();
+            let error = metrics::rmse(&y, &wave(&stretched)).unwrap();
             assert!(error < 0.7, "{stretch}: {error}");
         }
     }
@@ -63,7 +63,7 @@ fn a_default_model_does_not_explode_outside_the_data() {
 fn inside_the_data_the_bound_changes_nothing() {
     let (x, t) = noisy_wave(100, 3);
     let held = ElmParams::new(30).fit(&x, &t).unwrap();
-    let free = ElmParams::new(30).bounded(false).fit(&x, &t).unwrap();
+    let free = ElmParams::new(30).with_bounded(false).fit(&x, &t).unwrap();
     assert_eq!(held.predict(&x).unwrap(), free.predict(&x).unwrap());
     assert_eq!(
         held.hidden_matrix(&x).unwrap(),
@@ -94,7 +94,7 @@ fn beyond_an_edge_a_prediction_is_that_at_the_edge() {
         assert_eq!(expected.to_vec(), y);
     }
     // Switched off after the fit it is the sum of the neurons.
-    let free = model.clone().bounded(false);
+    let free = model.clone().with_bounded(false);
     let by_hand = free.hidden_matrix(&outside).unwrap().dot(&free.beta()) + free.intercept();
     approx::assert_relative_eq!(
         free.predict(&outside).unwrap(),
@@ -102,7 +102,7 @@ fn beyond_an_edge_a_prediction_is_that_at_the_edge() {
         max_relative = 1e-10
     );
     assert_eq!(
-        free.bounded(true).predict(&outside).unwrap(),
+        free.with_bounded(true).predict(&outside).unwrap(),
         model.predict(&outside).unwrap()
     );
 }
@@ -116,7 +116,7 @@ fn the_distance_from_the_data_is_told_in_standard_deviations() {
     let distance = model.distance_outside(&rows).unwrap();
     let expected = array![0.0, 3.0, 5.0] / (2.0_f64 / 3.0).sqrt();
     approx::assert_relative_eq!(distance, expected, max_relative = 1e-14);
-    let given = Elm::from_parts(
+    let given = <Elm<f64>>::from_parts(
         model.map().clone(),
         model.beta().to_owned(),
         model.intercept().to_owned(),
@@ -137,18 +137,17 @@ fn the_distance_from_the_data_is_told_in_standard_deviations() {
 fn bounds_travel<A: Scalar>() {
     let x = normal::<A>(60, 2, 5);
     let t = x.map_axis(Axis(1), |row| row[0] * row[1]);
-    let params = ElmParams::new(15).solver(Ridge::gcv());
+    let params = ElmParams::new(15).with_solver(Ridge::gcv());
     let model = params.fit(&x, &t).unwrap();
     let far = normal::<A>(40, 2, 6).mapv(|v| v * A::from_f64(30.0));
     let expected = model.predict(&far).unwrap();
     for again in [
-        persist::from_bytes::<Elm<A>>(&persist::to_bytes(&model).unwrap()).unwrap(),
+        persist::from_bytes::<Elm<A, Ix1>>(&persist::to_bytes(&model).unwrap()).unwrap(),
         persist::from_bytes(persist::to_json(&model).unwrap().as_bytes()).unwrap(),
     ] {
         assert_eq!(again.predict(&far).unwrap(), expected);
     }
-    let checked = params.clone().check().unwrap();
-    let mut one = Accumulator::from_sample(&checked, &x, 1).unwrap();
+    let mut one = Accumulator::from_sample(&params, &x, 1).unwrap();
     let mut other = one.clone();
     one.push(&x.slice(s![..20, ..]), &t.slice(s![..20]))
         .unwrap();
@@ -156,11 +155,16 @@ fn bounds_travel<A: Scalar>() {
         .push(&x.slice(s![20.., ..]), &t.slice(s![20..]))
         .unwrap();
     one.merge(&other).unwrap();
-    let one = persist::from_bytes::<Accumulator<A>>(&persist::to_bytes(&one).unwrap()).unwrap();
+    let one =
+        persist::from_bytes::<Accumulator<A, Ix1>>(&persist::to_bytes(&one).unwrap()).unwrap();
     assert_eq!(one.fit().unwrap().bounds(), model.bounds());
-    let pruned = checked.fit_pruned(&x, &t, Keep::Neurons(5)).unwrap();
+    let pruned = params
+        .fit_pruned(&Dataset::new(&x, &t).unwrap(), Keep::Neurons(5))
+        .unwrap();
     assert_eq!(pruned.model.bounds(), model.bounds());
-    let mean = params.fit_ensemble(2, &x, &t).unwrap();
+    let mean = params
+        .fit_ensemble(2, &Dataset::new(&x, &t).unwrap())
+        .unwrap();
     assert_eq!(mean.model().bounds(), model.bounds());
 }
 
@@ -189,7 +193,7 @@ fn a_skewed_input_just_beyond_its_largest_value_is_predicted_sanely() {
             ElmParams::auto().fit(&x, &t).unwrap(),
             ElmParams::new(100).fit(&x, &t).unwrap(),
         ] {
-            let y = model.predict(&beyond).unwrap()[[0, 0]];
+            let y = model.predict(&beyond).unwrap()[0];
             assert!(
                 (y - truth).abs() < 0.5 * truth,
                 "draw {draw}: {y} for {truth}"
@@ -203,7 +207,9 @@ fn intervals_and_deviations_widen_outside_the_data() {
     let (mut covered, mut rows) = (0, 0);
     for seed in 0..6 {
         let (x, t) = noisy_wave(200, 20 + 2 * seed);
-        let model = ElmParams::new(60).fit_uncertain(&x, &t).unwrap();
+        let model = ElmParams::new(60)
+            .fit_uncertain(&Dataset::new(&x, &t).unwrap())
+            .unwrap();
         let mut test = noisy_wave(500, 90 + 2 * seed);
         let noise = test.1 - wave(&test.0);
         test.0 *= 1.2;
@@ -212,8 +218,8 @@ fn intervals_and_deviations_widen_outside_the_data() {
         rows += observed.len();
         covered += observed
             .iter()
-            .zip(low.column(0))
-            .zip(high.column(0))
+            .zip(&low)
+            .zip(&high)
             .filter(|((t, low), high)| low <= t && t <= high)
             .count();
         // Along a line outwards both grow with the distance.
@@ -223,8 +229,8 @@ fn intervals_and_deviations_widen_outside_the_data() {
         let (low, high) = model.predict_interval(&line, 0.9).unwrap();
         let width = high - low;
         for i in 1..4 {
-            assert!(deviation[[i, 0]] > deviation[[i - 1, 0]]);
-            assert!(width[[i, 0]] > width[[i - 1, 0]]);
+            assert!(deviation[i] > deviation[i - 1]);
+            assert!(width[i] > width[i - 1]);
         }
     }
     let share = covered as f64 / rows as f64;
@@ -238,13 +244,14 @@ fn leave_one_out_of_skewed_inputs_has_bounded_output_weights() {
         let z = normal::<f64>(176, 2, 200 + draw);
         let x = z.slice(s![.., ..1]).mapv(|z| (6.8 + 0.45 * z).exp());
         let t = x.column(0).mapv(|x| 80.0 + x / 2.0) + 0.06 * &x.column(0) * z.column(1);
-        let params = ElmParams::new(100).check().unwrap();
+        let params = ElmParams::new(100);
         let model = params.fit(&x, &t).unwrap();
         let hidden = model.hidden_matrix(&x).unwrap();
         let targets = t.insert_axis(Axis(1));
         let problem = elm::solve::LeastSquares::new(&hidden, &targets).unwrap();
-        let validator = elm::validate::Validator::new(&problem.intercept(true)).unwrap();
-        let path = validator.leave_one_out_path(&Ridge::candidates()).unwrap();
+        let validator =
+            elm::cross_validation::CrossValidator::new(&problem.with_intercept(true)).unwrap();
+        let path = validator.leave_one_out_path(&Ridge::lambda_grid()).unwrap();
         let scores = path.rmse().column(0).to_owned();
         let smallest = scores.iter().copied().fold(f64::INFINITY, f64::min);
         let found = model.diagnosis().leave_one_out.as_ref().unwrap()[0];

@@ -53,7 +53,7 @@ pub(crate) fn frobenius<A: Scalar>(matrix: &Array2<A>) -> f64 {
 }
 
 /// What rounding errors are amplified by on the way to the output weights: the condition of the
-/// matrix, or where it was not found that of the regularised normal equations.
+/// matrix, or where it was not found that of the regularized normal equations.
 pub(crate) fn amplification(diagnosis: &Diagnosis) -> f64 {
     diagnosis.condition.unwrap_or_else(|| {
         let weakest = diagnosis.lambda.iter().copied().fold(1.0, f64::min);
@@ -101,9 +101,9 @@ impl<A: Scalar> Problem<A> {
     pub(crate) fn view(&self) -> LeastSquares<'_, A> {
         let problem = LeastSquares::new(&self.hidden, &self.targets)
             .unwrap()
-            .intercept(self.intercept);
+            .with_intercept(self.intercept);
         match &self.weights {
-            Some(weights) => problem.weights(weights).unwrap(),
+            Some(weights) => problem.with_weights(weights).unwrap(),
             None => problem,
         }
     }

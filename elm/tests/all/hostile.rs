@@ -1,10 +1,10 @@
 //! What somebody who wants to break the library would try: an error that names the place, or an
 //! answer that is right.
 
+use elm::cross_validation::{CrossValidator, assign_folds};
 use elm::solve::{PseudoInverse, Ridge, Solver};
 use elm::tune::Criterion;
-use elm::validate::{Validator, assign_folds};
-use elm::{Accumulator, Activation, ElmParams, Error, Scaler, metrics, solve};
+use elm::{Accumulator, Activation, Dataset, ElmParams, Error, Scaler, metrics, solve};
 use ndarray::{Array1, Array2, ArrayView2, Axis, ShapeBuilder, array, s};
 
 fn wave(rows: usize) -> (Array2<f64>, Array1<f64>) {
@@ -69,17 +69,20 @@ fn sizes_that_no_memory_holds_are_errors() {
         let params = ElmParams::<f64>::new(neurons);
         assert!(matches!(params.fit(&x, &t), Err(Error::TooLarge { .. })));
         assert!(matches!(
-            params.direct_links(true).fit(&x, &t),
+            params.with_direct_links(true).fit(&x, &t),
             Err(Error::TooLarge { .. })
         ));
     }
-    let params = ElmParams::new(5).check().unwrap();
+    let params = ElmParams::new(5);
     for outputs in [usize::MAX, 1 << 40] {
-        let accumulator = Accumulator::from_sample(&params, &x, outputs);
+        let accumulator = <Accumulator<f64>>::from_sample(&params, &x, outputs);
         assert!(matches!(accumulator, Err(Error::TooLarge { .. })));
     }
     let tuner = ElmParams::<f64>::new(usize::MAX).tuner();
-    assert!(matches!(tuner.tune(&x, &t), Err(Error::TooLarge { .. })));
+    assert!(matches!(
+        tuner.tune(&Dataset::new(&x, &t).unwrap()),
+        Err(Error::TooLarge { .. })
+    ));
 }
 
 #[test]
@@ -92,13 +95,13 @@ fn one_row_and_two_are_fitted_by_every_solver_and_way() {
             Ridge::relative(1e-6).into(),
             PseudoInverse::default().into(),
         ] {
-            let params = ElmParams::new(5).solver(solver);
+            let params = ElmParams::new(5).with_solver(solver);
             let model = params.fit(&x, &t).unwrap();
             assert!(
                 model.predict(&x).unwrap().iter().all(|y| y.is_finite()),
                 "{solver}"
             );
-            let checked = params.check().unwrap();
+            let checked = params;
             let chunks = [Ok::<_, Error>((x.clone(), t.clone().insert_axis(Axis(1))))];
             let chunked = checked.fit_chunks(chunks).unwrap();
             assert!(
@@ -106,7 +109,7 @@ fn one_row_and_two_are_fitted_by_every_solver_and_way() {
                 "{solver}"
             );
         }
-        match ElmParams::new(5).fit_uncertain(&x, &t) {
+        match ElmParams::new(5).fit_uncertain(&Dataset::new(&x, &t).unwrap()) {
             Ok(model) => {
                 assert!(rows > 1);
                 let deviation = model.predict_deviation(&x).unwrap();
@@ -114,7 +117,7 @@ fn one_row_and_two_are_fitted_by_every_solver_and_way() {
             }
             Err(error) => assert!(matches!(error, Error::Undetermined { .. }), "{error}"),
         }
-        match ElmParams::auto().tune(&x, &t) {
+        match ElmParams::auto().tune(&Dataset::new(&x, &t).unwrap()) {
             Ok(tuned) => assert!(
                 tuned
                     .model
@@ -137,7 +140,9 @@ fn one_row_and_two_are_fitted_by_every_solver_and_way() {
 #[test]
 fn intervals_of_any_coverage_are_ordered_or_refused() {
     let (x, t) = wave(24);
-    let model = ElmParams::new(7).fit_uncertain(&x, &t).unwrap();
+    let model = ElmParams::new(7)
+        .fit_uncertain(&Dataset::new(&x, &t).unwrap())
+        .unwrap();
     for coverage in [
         f64::MIN_POSITIVE,
         1e-300,
@@ -183,16 +188,22 @@ fn folds_that_leave_nothing_are_named() {
             Solver::from(Ridge::relative(1e-3)),
             PseudoInverse::default().into(),
         ] {
-            let params = ElmParams::new(5).solver(solver).intercept(intercept);
-            let checked = params.check().unwrap();
-            match checked.cross_validate(&x, &t, &all_one) {
+            let params = ElmParams::new(5)
+                .with_solver(solver)
+                .with_intercept(intercept);
+            let checked = params;
+            match checked.cross_val_predict(&Dataset::new(&x, &t).unwrap(), &all_one) {
                 // Ridge without rows and without an intercept is 0 everywhere.
                 Ok(held_out) => assert!(held_out.predictions().iter().all(|p| p.abs() < 1e-12)),
                 Err(error) => assert_eq!(error, Error::Undetermined { fold: 9 }),
             }
-            assert!(checked.cross_validate(&x, &t, &singles).is_ok());
+            assert!(
+                checked
+                    .cross_val_predict(&Dataset::new(&x, &t).unwrap(), &singles)
+                    .is_ok()
+            );
             for folds in [&singles[..0], &singles[..23]] {
-                let refused = checked.cross_validate(&x, &t, folds);
+                let refused = checked.cross_val_predict(&Dataset::new(&x, &t).unwrap(), folds);
                 assert!(matches!(refused, Err(Error::Shape { .. })));
             }
         }
@@ -228,7 +239,7 @@ fn strengths_at_the_ends_of_the_range_are_solved_or_refused() {
         1e300,
         f64::MAX,
     ] {
-        let params = ElmParams::new(7).solver(Ridge::relative(lambda));
+        let params = ElmParams::new(7).with_solver(Ridge::relative(lambda));
         match params.fit(&x, &t) {
             Ok(model) => {
                 let y = model.predict(&x).unwrap();
@@ -248,14 +259,14 @@ fn strengths_at_the_ends_of_the_range_are_solved_or_refused() {
     }
     for lambda in [-0.5, -f64::MIN_POSITIVE, f64::NAN, f64::INFINITY] {
         let refused = ElmParams::new(7)
-            .solver(Ridge::relative(lambda))
+            .with_solver(Ridge::relative(lambda))
             .fit(&x, &t);
         assert!(matches!(refused, Err(Error::Parameter { .. })), "{lambda}");
     }
     let hidden: Array2<f64> = array![[1.0, 2.0], [0.5, 1.0], [3.0, -1.0]];
     let targets = array![[1.0], [2.0], [3.0]];
     let problem = solve::LeastSquares::new(&hidden, &targets).unwrap();
-    let validator = Validator::new(&problem).unwrap();
+    let validator = CrossValidator::new(&problem).unwrap();
     for lambda in [-1.0, f64::NAN, f64::INFINITY] {
         let refused = validator.leave_one_out(&[lambda]);
         assert!(matches!(refused, Err(Error::Parameter { .. })));
@@ -287,7 +298,7 @@ fn single_precision_at_the_end_of_its_range_overflows_with_an_error_or_not_at_al
             let t = t.mapv(|v| v as f32 * target);
             for params in [
                 ElmParams::<f32>::new(7),
-                ElmParams::new(7).standardise(false),
+                ElmParams::new(7).with_standardize(false),
             ] {
                 if let Ok(model) = params.fit(&x, &t)
                     && let Ok(y) = model.predict(&x)
@@ -317,10 +328,10 @@ fn functions_that_are_not_finite_are_an_error_in_the_fit_and_in_the_prediction()
     let (x, t) = wave(24);
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let always = Activation::custom("bad", move |_| bad);
-        let fitted = ElmParams::new(3).activation(always).fit(&x, &t);
+        let fitted = ElmParams::new(3).with_activation(always).fit(&x, &t);
         assert!(matches!(fitted, Err(Error::NotFinite { .. })), "{bad}");
         let later = Activation::custom("later", move |z: f64| if z > 100.0 { bad } else { z });
-        let params = ElmParams::new(3).activation(later).bounded(false);
+        let params = ElmParams::new(3).with_activation(later).with_bounded(false);
         let model = params.fit(&x, &t).unwrap();
         let far = array![[1e9, 1e9], [-1e9, 1e9], [1e9, -1e9], [-1e9, -1e9]];
         assert!(
@@ -331,7 +342,7 @@ fn functions_that_are_not_finite_are_an_error_in_the_fit_and_in_the_prediction()
     // Every built-in function on rows as far out as there are.
     for activation in Activation::<f64>::BUILT_IN {
         let model = ElmParams::new(3)
-            .activation(activation.clone())
+            .with_activation(activation.clone())
             .fit(&x, &t)
             .unwrap();
         for far in [1e300, f64::MAX] {
@@ -366,36 +377,39 @@ fn settings_read_from_outside_are_checked_where_they_are_used() {
 #[test]
 fn a_tuner_with_odd_settings_finds_something_or_names_them() {
     let (x, t) = wave(24);
-    let tuner = || ElmParams::<f64>::auto().budget(3);
+    let tuner = || ElmParams::<f64>::auto().with_budget(3);
     for (what, tuner) in [
-        ("no budget", tuner().budget(0)),
-        ("no neurons", tuner().max_neurons(0)),
-        ("no rows", tuner().search_rows(0)),
-        ("one row", tuner().search_rows(1)),
-        ("no folds", tuner().criterion(Criterion::KFold(0))),
-        ("one fold", tuner().criterion(Criterion::KFold(1))),
+        ("no budget", tuner().with_budget(0)),
+        ("no neurons", tuner().with_max_neurons(0)),
+        ("no rows", tuner().with_search_rows(0)),
+        ("one row", tuner().with_search_rows(1)),
+        ("no folds", tuner().with_criterion(Criterion::KFold(0))),
+        ("one fold", tuner().with_criterion(Criterion::KFold(1))),
         (
             "folds without end",
-            tuner().criterion(Criterion::KFold(usize::MAX)),
+            tuner().with_criterion(Criterion::KFold(usize::MAX)),
         ),
     ] {
         assert!(
-            matches!(tuner.tune(&x, &t), Err(Error::Parameter { .. })),
+            matches!(
+                tuner.tune(&Dataset::new(&x, &t).unwrap()),
+                Err(Error::Parameter { .. })
+            ),
             "{what}"
         );
     }
     for (what, tuner) in [
-        ("one try", tuner().budget(1)),
-        ("one neuron", tuner().max_neurons(1)),
-        ("all rows and more", tuner().search_rows(usize::MAX)),
-        ("two rows", tuner().search_rows(2)),
+        ("one try", tuner().with_budget(1)),
+        ("one neuron", tuner().with_max_neurons(1)),
+        ("all rows and more", tuner().with_search_rows(usize::MAX)),
+        ("two rows", tuner().with_search_rows(2)),
         (
             "a fold for each row",
-            tuner().criterion(Criterion::KFold(24)),
+            tuner().with_criterion(Criterion::KFold(24)),
         ),
     ] {
         let tuned = tuner
-            .tune(&x, &t)
+            .tune(&Dataset::new(&x, &t).unwrap())
             .unwrap_or_else(|error| panic!("{what}: {error}"));
         assert!(tuned.best.score.is_finite(), "{what}");
     }
@@ -433,17 +447,19 @@ fn measures_of_error_hold_at_the_ends_of_the_range() {
 #[test]
 fn an_accumulator_does_not_mind_empty_chunks_and_rows_without_weight() {
     let (x, t) = wave(24);
-    let params = ElmParams::new(5)
-        .solver(Ridge::relative(1e-4))
-        .check()
-        .unwrap();
+    let params = ElmParams::new(5).with_solver(Ridge::relative(1e-4));
     let mut plain = Accumulator::from_sample(&params, &x, 1).unwrap();
     let mut odd = plain.clone();
     plain.push(&x, &t).unwrap();
     odd.push(&x.slice(s![..0, ..]), &t.slice(s![..0])).unwrap();
     odd.push(&x, &t).unwrap();
-    odd.push_weighted(&x, &t.mapv(|t| t + 100.0), &Array1::zeros(24))
-        .unwrap();
+    odd.push_dataset(
+        &Dataset::new(&x, &t.mapv(|t| t + 100.0))
+            .unwrap()
+            .with_weights(&Array1::zeros(24))
+            .unwrap(),
+    )
+    .unwrap();
     odd.merge(&Accumulator::from_sample(&params, &x, 1).unwrap())
         .unwrap();
     let (a, b) = (plain.fit().unwrap(), odd.fit().unwrap());

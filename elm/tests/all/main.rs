@@ -10,6 +10,7 @@ mod bad_input;
 mod bounds;
 mod common;
 mod csv_example;
+mod dataset;
 mod hostile;
 mod many_rows;
 mod persist;

@@ -1,9 +1,9 @@
 //! Problems of many more rows than neurons, which are solved a tile of rows at a time: the answers are
-//! those of the factorised hidden-layer matrix.
+//! those of the factorized hidden-layer matrix.
 
+use elm::cross_validation::CrossValidator;
 use elm::solve::{LeastSquares, PseudoInverse, Ridge, Route, Solver};
-use elm::validate::Validator;
-use elm::{ElmParams, Scalar};
+use elm::{Dataset, ElmParams, Scalar};
 use ndarray::{Array1, Array2};
 
 use crate::common::{largest, normal, weights};
@@ -21,17 +21,24 @@ fn data<A: Scalar>(rows: usize) -> (Array2<A>, Array2<A>) {
 fn agrees_with_the_matrix<A: Scalar>(params: ElmParams<A>, bound: f64) -> Route {
     let (x, t) = data::<A>(70_000);
     let weights: Array1<A> = weights(x.nrows(), 3);
-    let params = params.bounded(false).check().unwrap();
-    let model = params.fit_weighted(&x, &t, Some(weights.view())).unwrap();
+    let params = params.with_bounded(false);
+    let model = params
+        .fit_dataset(
+            &Dataset::new(&x, &t)
+                .unwrap()
+                .with_weights(&weights)
+                .unwrap(),
+        )
+        .unwrap();
     let hidden = model.hidden_matrix(&x).unwrap();
     let (hidden, targets) = (hidden.mapv(Scalar::as_f64), t.mapv(Scalar::as_f64));
     let weights = weights.mapv(Scalar::as_f64);
     let problem = LeastSquares::new(&hidden, &targets)
         .unwrap()
-        .intercept(true);
-    let validator = Validator::new(&problem.weights(&weights).unwrap()).unwrap();
+        .with_intercept(true);
+    let validator = CrossValidator::new(&problem.with_weights(&weights).unwrap()).unwrap();
     let diagnosis = model.diagnosis();
-    let lambda = validator.strengths(Ridge::default()).unwrap();
+    let lambda = validator.select_lambda(Ridge::default()).unwrap();
     assert_eq!(diagnosis.lambda, lambda);
     let expected = validator.leave_one_out(&lambda).unwrap().rmse();
     for (found, expected) in diagnosis
@@ -57,9 +64,9 @@ fn agrees_with_the_matrix<A: Scalar>(params: ElmParams<A>, bound: f64) -> Route 
 /// and beyond condition times epsilon times the root of the size, 5e-6, on the other way.
 #[test]
 fn leave_one_out_of_many_rows_is_that_of_the_matrix() {
-    let steep = ElmParams::new(60).scale(2.0).direct_links(true);
+    let steep = ElmParams::new(60).with_scale(2.0).with_direct_links(true);
     assert_eq!(agrees_with_the_matrix::<f64>(steep, 1e-8), Route::GramSvd);
-    let flat = ElmParams::new(63).scale(0.1);
+    let flat = ElmParams::new(63).with_scale(0.1);
     assert_eq!(agrees_with_the_matrix::<f64>(flat, 5e-6), Route::QrSvd);
 }
 
@@ -70,8 +77,8 @@ fn leave_one_out_of_many_rows_foretells_errors_in_single_precision() {
     let (test, expected) = data::<f32>(80_000);
     let rest = ndarray::s![70_000.., ..];
     for params in [
-        ElmParams::new(63).scale(0.1),
-        ElmParams::new(60).scale(2.0).direct_links(true),
+        ElmParams::new(63).with_scale(0.1),
+        ElmParams::new(60).with_scale(2.0).with_direct_links(true),
     ] {
         let model = params.fit(&x, &t).unwrap();
         let errors = model.predict(&test.slice(rest)).unwrap() - expected.slice(rest);
@@ -93,11 +100,14 @@ fn other_solvers_of_many_rows_agree_with_the_matrix() {
         Ridge::relative(1e-10).into(),
         Ridge::gcv().into(),
     ] {
-        let params = ElmParams::new(60).scale(2.0).solver(solver).bounded(false);
+        let params = ElmParams::new(60)
+            .with_scale(2.0)
+            .with_solver(solver)
+            .with_bounded(false);
         let model = params.fit(&x, &t).unwrap();
         let hidden = model.hidden_matrix(&x).unwrap();
-        let problem = LeastSquares::new(&hidden, &t).unwrap().intercept(true);
-        let validator = Validator::new(&problem).unwrap();
+        let problem = LeastSquares::new(&hidden, &t).unwrap().with_intercept(true);
+        let validator = CrossValidator::new(&problem).unwrap();
         let expected = validator.solve(&model.diagnosis().lambda).unwrap();
         let fitted = hidden.dot(&expected.beta) + &expected.intercept;
         let apart = largest(&(model.predict(&x).unwrap() - &fitted));

@@ -2,7 +2,7 @@
 
 use elm::persist::{self, Error};
 use elm::solve::Ridge;
-use elm::{Accumulator, Activation, Elm, ElmParams, Kind, Neurons};
+use elm::{Accumulator, Activation, Elm, ElmParams, NeuronGroup, NodeType};
 use ndarray::{Array2, s};
 
 fn data() -> (Array2<f64>, Array2<f64>) {
@@ -14,18 +14,18 @@ fn data() -> (Array2<f64>, Array2<f64>) {
 /// Neurons of three kinds in one layer.
 fn mixed() -> ElmParams<f64> {
     ElmParams::new(5)
-        .and(Neurons::new(4, Activation::Sine))
-        .and(Neurons::radial(3))
+        .with_group(NeuronGroup::new(4, Activation::Sine))
+        .with_group(NeuronGroup::rbf(3))
 }
 
 fn models() -> Vec<Elm<f64>> {
     let (x, t) = data();
     Activation::BUILT_IN
         .into_iter()
-        .map(|activation| ElmParams::new(12).activation(activation))
+        .map(|activation| ElmParams::new(12).with_activation(activation))
         .chain([
-            ElmParams::new(5).direct_links(true),
-            ElmParams::new(5).standardise(false),
+            ElmParams::new(5).with_direct_links(true),
+            ElmParams::new(5).with_standardize(false),
             mixed(),
         ])
         .map(|params| params.fit(&x, &t).unwrap())
@@ -115,10 +115,7 @@ fn what_is_wrong_with_a_file_is_said_with_its_name() {
 #[test]
 fn an_accumulator_goes_on_where_its_file_left_off() {
     let (x, t) = data();
-    let params = ElmParams::new(8)
-        .solver(Ridge::relative(1e-6))
-        .check()
-        .unwrap();
+    let params = ElmParams::new(8).with_solver(Ridge::relative(1e-6));
     let mut whole = Accumulator::from_sample(&params, &x, 2).unwrap();
     let mut parts = whole.clone();
     whole.push(&x, &t).unwrap();
@@ -140,8 +137,8 @@ fn a_custom_activation_is_refused_by_name() {
     let (x, t) = data();
     let cube = Activation::custom("cube", |z: f64| z * z * z);
     for params in [
-        ElmParams::new(4).activation(cube.clone()),
-        mixed().and(Neurons::new(2, cube).kind(Kind::Radial)),
+        ElmParams::new(4).with_activation(cube.clone()),
+        mixed().with_group(NeuronGroup::new(2, cube).with_node_type(NodeType::Rbf)),
     ] {
         let model = params.fit(&x, &t).unwrap();
         for error in [
@@ -249,7 +246,7 @@ fn a_fit_at_the_end_of_the_range_survives_json() {
         |(row, _)| if row % 2 == 0 { 4e307 } else { -4e307 },
     );
     let model = ElmParams::new(1)
-        .solver(Ridge::relative(1e3))
+        .with_solver(Ridge::relative(1e3))
         .fit(&x, &t)
         .unwrap();
     assert_eq!(model.diagnosis().residual_norm, [f64::MAX]);

@@ -1,10 +1,11 @@
 //! Pruned networks: what is kept, by how much it beats chance, and that its error is as stated.
 
+use elm::advanced::FeatureMap;
 use elm::prune::{Keep, Pruned};
 use elm::solve::{Inverse, PseudoInverse, Ridge};
-use elm::{Activation, Biases, Elm, ElmParams, Error, FeatureMap, Neurons, Scaler, metrics};
+use elm::{Activation, Biases, Dataset, Elm, ElmParams, Error, NeuronGroup, Scaler, metrics};
 use elm_datasets::toy::{self, Toy};
-use ndarray::{Array1, Array2, Axis, array, s};
+use ndarray::{Array1, Array2, Axis, Ix1, array, s};
 
 /// Smooth, of four inputs.
 fn smooth(rows: usize, seed: u64) -> (Array2<f64>, Array1<f64>) {
@@ -19,14 +20,14 @@ fn smooth(rows: usize, seed: u64) -> (Array2<f64>, Array1<f64>) {
 
 fn params(neurons: usize, seed: u64) -> ElmParams<f64> {
     ElmParams::new(neurons)
-        .activation(Activation::Tanh)
-        .biases(Biases::OnData)
-        .scale(0.4)
-        .seed(seed)
+        .with_activation(Activation::Tanh)
+        .with_biases(Biases::AtTrainingRows)
+        .with_scale(0.4)
+        .with_seed(seed)
 }
 
-fn rmse(model: &Elm<f64>, (x, t): &(Array2<f64>, Array1<f64>)) -> f64 {
-    metrics::rmse(&model.predict(x).unwrap().column(0), t).unwrap()
+fn rmse(model: &Elm<f64, Ix1>, (x, t): &(Array2<f64>, Array1<f64>)) -> f64 {
+    metrics::rmse(&model.predict(x).unwrap(), t).unwrap()
 }
 
 #[test]
@@ -35,7 +36,7 @@ fn so_many_pruned_neurons_beat_as_many_random_ones_on_rows_held_out() {
     for seed in 0..3 {
         let (x, t) = smooth(400, seed);
         let pruned = params(200, seed)
-            .fit_pruned(&x, &t, Keep::Neurons(25))
+            .fit_pruned(&Dataset::new(&x, &t).unwrap(), Keep::Neurons(25))
             .unwrap();
         let random = params(25, seed).fit(&x, &t).unwrap();
         assert_eq!(pruned.model.hidden().neurons(), 25);
@@ -48,11 +49,13 @@ fn so_many_pruned_neurons_beat_as_many_random_ones_on_rows_held_out() {
 fn the_neurons_kept_are_those_drawn_and_the_network_is_the_ordinary_fit_to_them() {
     let (x, t) = smooth(150, 1);
     let mixed = params(30, 4)
-        .and(Neurons::new(20, Activation::Sine))
-        .and(Neurons::radial(20))
-        .direct_links(true);
+        .with_group(NeuronGroup::new(20, Activation::Sine))
+        .with_group(NeuronGroup::rbf(20))
+        .with_direct_links(true);
     let all = mixed.fit(&x, &t).unwrap();
-    let Pruned { model, kept, .. } = mixed.fit_pruned(&x, &t, Keep::Neurons(18)).unwrap();
+    let Pruned { model, kept, .. } = mixed
+        .fit_pruned(&Dataset::new(&x, &t).unwrap(), Keep::Neurons(18))
+        .unwrap();
     assert!(kept.is_sorted() && kept.len() == 18);
     assert_eq!(
         model.hidden().weights(),
@@ -68,13 +71,14 @@ fn the_neurons_kept_are_those_drawn_and_the_network_is_the_ordinary_fit_to_them(
     let t = t.insert_axis(Axis(1));
     let problem = elm::solve::LeastSquares::new(&h, &t)
         .unwrap()
-        .intercept(true);
+        .with_intercept(true);
     let solution = elm::solve::Solver::from(Ridge::default())
         .solve(&problem)
         .unwrap();
     // The same fit, to rounding: the weights themselves are ill conditioned.
     let fitted = h.dot(&solution.beta) + &solution.intercept;
-    approx::assert_abs_diff_eq!(model.predict(&x).unwrap(), fitted, epsilon = 1e-9);
+    let predicted = model.predict(&x).unwrap();
+    approx::assert_abs_diff_eq!(predicted, fitted.column(0), epsilon = 1e-9);
 }
 
 #[test]
@@ -84,24 +88,27 @@ fn the_scores_of_all_sizes_are_those_of_leave_one_out_at_that_strength() {
         inputs, targets, ..
     } = toy::friedman2(60, 100.0, 1).unwrap();
     let lambda = 1e-4;
-    let params = params(12, 2).solver(Ridge::relative(lambda));
+    let params = params(12, 2).with_solver(Ridge::relative(lambda));
     let all = params.fit(&inputs, &targets).unwrap();
     let absolute = lambda * all.diagnosis().largest_singular_value.powi(2);
     let pruned = params
-        .fit_pruned(&inputs, &targets, Keep::Loss(0.0))
+        .fit_pruned(&Dataset::new(&inputs, &targets).unwrap(), Keep::Loss(0.0))
         .unwrap();
     assert_eq!(pruned.path.len(), 12);
     let spread = targets.std(0.0);
     for size in &pruned.path {
         let kept = params
-            .fit_pruned(&inputs, &targets, Keep::Neurons(size.neurons))
+            .fit_pruned(
+                &Dataset::new(&inputs, &targets).unwrap(),
+                Keep::Neurons(size.neurons),
+            )
             .unwrap();
         let largest = kept.model.diagnosis().largest_singular_value.powi(2);
         let h = kept.model.hidden_matrix(&inputs).unwrap();
         let problem = elm::solve::LeastSquares::new(&h, &targets)
             .unwrap()
-            .intercept(true);
-        let validator = elm::validate::Validator::new(&problem).unwrap();
+            .with_intercept(true);
+        let validator = elm::cross_validation::CrossValidator::new(&problem).unwrap();
         let expected = validator
             .leave_one_out(&[absolute / largest])
             .unwrap()
@@ -118,7 +125,7 @@ fn each_neuron_struck_out_is_the_one_whose_loss_costs_least() {
     let (x, t) = smooth(80, 3);
     let t = (&t - t.mean().unwrap()).insert_axis(Axis(1));
     let lambda = 1e-3;
-    let params = params(9, 5).solver(Ridge::relative(lambda));
+    let params = params(9, 5).with_solver(Ridge::relative(lambda));
     let all = params.fit(&x, &t).unwrap();
     let absolute = lambda * all.diagnosis().largest_singular_value.powi(2);
     let h = all.hidden_matrix(&x).unwrap();
@@ -145,7 +152,7 @@ fn each_neuron_struck_out_is_the_one_whose_loss_costs_least() {
             .unwrap();
         left = without(cheapest);
         let pruned = params
-            .fit_pruned(&x, &t, Keep::Neurons(left.len()))
+            .fit_pruned(&Dataset::new(&x, &t).unwrap(), Keep::Neurons(left.len()))
             .unwrap();
         assert_eq!(pruned.kept, left);
     }
@@ -163,13 +170,14 @@ fn a_loss_is_kept_to_by_leave_one_out_and_about_so_on_rows_held_out() {
         let Toy {
             inputs, targets, ..
         } = toy::friedman1(400, 1.0, seed).unwrap();
+        let targets = targets.column(0);
         let params = params(120, seed);
         let all = params.fit(&inputs, &targets).unwrap();
         let pruned = params
-            .fit_pruned(&inputs, &targets, Keep::Loss(0.1))
+            .fit_pruned(&Dataset::new(&inputs, &targets).unwrap(), Keep::Loss(0.1))
             .unwrap();
-        let loo = |model: &Elm<f64>| model.diagnosis().leave_one_out.clone().unwrap()[0];
-        // 1 % for generalised cross-validation in place of leave-one-out.
+        let loo = |model: &Elm<f64, Ix1>| model.diagnosis().leave_one_out.clone().unwrap()[0];
+        // 1 % for generalized cross-validation in place of leave-one-out.
         assert!(loo(&pruned.model) <= 1.11 * loo(&all), "seed {seed}");
         assert!(pruned.kept.len() < 80, "{}", pruned.kept.len());
         // The same rows chose: held out, the loss may be larger, but not by much.
@@ -178,7 +186,7 @@ fn a_loss_is_kept_to_by_leave_one_out_and_about_so_on_rows_held_out() {
             "seed {seed}"
         );
         let stricter = params
-            .fit_pruned(&inputs, &targets, Keep::Loss(0.02))
+            .fit_pruned(&Dataset::new(&inputs, &targets).unwrap(), Keep::Loss(0.02))
             .unwrap();
         assert!(stricter.kept.len() > pruned.kept.len());
     }
@@ -189,23 +197,25 @@ fn several_outputs_and_single_precision_are_pruned_alike() {
     let (x, t) = smooth(200, 6);
     // Units must not matter: the second output is the first in others.
     let both = ndarray::stack![Axis(1), t, &t * 1e6 + 3.0];
-    let one = params(40, 1).fit_pruned(&x, &t, Keep::Neurons(12)).unwrap();
+    let one = params(40, 1)
+        .fit_pruned(&Dataset::new(&x, &t).unwrap(), Keep::Neurons(12))
+        .unwrap();
     let two = params(40, 1)
-        .fit_pruned(&x, &both, Keep::Neurons(12))
+        .fit_pruned(&Dataset::new(&x, &both).unwrap(), Keep::Neurons(12))
         .unwrap();
     assert_eq!(one.kept, two.kept);
     let (single_x, single_t) = (x.mapv(|v| v as f32), t.mapv(|v| v as f32));
     let single = ElmParams::<f32>::new(40)
-        .activation(Activation::Tanh)
-        .biases(Biases::OnData)
-        .scale(0.4)
-        .seed(1)
-        .fit_pruned(&single_x, &single_t, Keep::Neurons(12))
+        .with_activation(Activation::Tanh)
+        .with_biases(Biases::AtTrainingRows)
+        .with_scale(0.4)
+        .with_seed(1)
+        .fit_pruned(
+            &Dataset::new(&single_x, &single_t).unwrap(),
+            Keep::Neurons(12),
+        )
         .unwrap();
-    let error = metrics::rmse(
-        &single.model.predict(&single_x).unwrap().column(0),
-        &single_t,
-    );
+    let error = metrics::rmse(&single.model.predict(&single_x).unwrap(), &single_t);
     let double = rmse(&one.model, &(x, t));
     assert!(error.unwrap() < 2.0 * double + 1e-3);
 }
@@ -222,7 +232,10 @@ fn hard_problems_are_pruned_without_harm() {
     ] {
         for keep in [Keep::Neurons(3), Keep::Loss(0.1), Keep::Loss(0.0)] {
             for scale in [1e-3, 1.0, 1e3] {
-                let pruned = params(50, 1).scale(scale).fit_pruned(&x, &t, keep).unwrap();
+                let pruned = params(50, 1)
+                    .with_scale(scale)
+                    .fit_pruned(&Dataset::new(&x, &t).unwrap(), keep)
+                    .unwrap();
                 assert!(
                     pruned
                         .model
@@ -246,13 +259,19 @@ fn what_cannot_be_pruned_is_named() {
         Keep::Loss(f64::NAN),
         Keep::Loss(f64::INFINITY),
     ] {
-        let error = params(30, 1).fit_pruned(&x, &t, keep).unwrap_err();
+        let error = params(30, 1)
+            .fit_pruned(&Dataset::new(&x, &t).unwrap(), keep)
+            .unwrap_err();
         assert!(matches!(error, Error::Parameter { .. }), "{error}");
     }
-    let by = |params: ElmParams<f64>| params.fit_pruned(&x, &t, Keep::Neurons(3)).unwrap_err();
+    let by = |params: ElmParams<f64>| {
+        params
+            .fit_pruned(&Dataset::new(&x, &t).unwrap(), Keep::Neurons(3))
+            .unwrap_err()
+    };
     for error in [
-        by(params(30, 1).solver(Inverse)),
-        by(params(30, 1).solver(PseudoInverse::default())),
+        by(params(30, 1).with_solver(Inverse)),
+        by(params(30, 1).with_solver(PseudoInverse::default())),
     ] {
         assert!(matches!(error, Error::Conflict { .. }), "{error}");
     }
@@ -261,14 +280,17 @@ fn what_cannot_be_pruned_is_named() {
 #[test]
 fn rows_without_weight_have_no_say_in_what_is_kept() {
     let (x, t) = smooth(300, 5);
-    let checked = params(60, 5).solver(Ridge::relative(1e-8)).check().unwrap();
+    let checked = params(60, 5).with_solver(Ridge::relative(1e-8));
     // Every third row is wrong, and does not count.
     let wrong = |row: usize| row.is_multiple_of(3);
     let spoilt = Array1::from_shape_fn(300, |row| if wrong(row) { 1e3 } else { t[row] });
     let weights = Array1::from_shape_fn(300, |row| if wrong(row) { 0.0 } else { 2.0 });
     let kept = |t: &Array1<f64>, weights: &Array1<f64>| {
         let keep = Keep::Neurons(20);
-        let pruned = checked.fit_pruned_weighted(&x, t, keep, Some(weights.view()));
+        let pruned = checked.fit_pruned(
+            &Dataset::new(&x, t).unwrap().with_weights(weights).unwrap(),
+            keep,
+        );
         pruned.unwrap()
     };
     let (clean, weighted) = (kept(&t, &weights), kept(&spoilt, &weights));
@@ -282,27 +304,33 @@ fn rows_without_weight_have_no_say_in_what_is_kept() {
 fn a_layer_that_is_there_already_is_fitted_as_when_it_was_drawn() {
     let (x, t) = smooth(200, 7);
     for solver in [Ridge::relative(1e-6), Ridge::leave_one_out()] {
-        let checked = ElmParams::new(30).seed(7).solver(solver).check().unwrap();
+        let checked = ElmParams::new(30).with_seed(7).with_solver(solver);
         let drawn = checked.fit(&x, &t).unwrap();
-        let map = checked.params().feature_map().draw_on(&x).unwrap();
-        let given = checked.fit_map(map.clone(), &x, &t, None);
+        let map = checked.feature_map().draw_on(&x).unwrap();
+        let given = checked.fit_map(map.clone(), &Dataset::new(&x, &t).unwrap());
         let difference = given.unwrap().predict(&x).unwrap() - drawn.predict(&x).unwrap();
         assert!(difference.iter().all(|d| d.abs() < 1e-9));
         let keep = Keep::Neurons(9);
-        let given = checked.prune_map(map.clone(), &x, &t, keep, None);
-        assert_eq!(given.unwrap(), checked.fit_pruned(&x, &t, keep).unwrap());
+        let given = checked.prune_map(map.clone(), &Dataset::new(&x, &t).unwrap(), keep);
+        assert_eq!(
+            given.unwrap(),
+            checked
+                .fit_pruned(&Dataset::new(&x, &t).unwrap(), keep)
+                .unwrap()
+        );
 
         let narrow = Scaler::measured(&x.slice(s![.., ..2])).unwrap();
-        let layer = checked.params().feature_map().draw(3).unwrap();
+        let layer = checked.feature_map().draw(3).unwrap();
         let refused = FeatureMap::new(Some(narrow), layer.clone(), false);
         assert!(matches!(refused, Err(Error::Shape { .. })), "{refused:?}");
         for (map, t) in [
             (FeatureMap::new(None, layer, false).unwrap(), &t),
             (map, &t.slice(s![..9]).to_owned()),
         ] {
-            let refused = checked.fit_map(map.clone(), &x, t, None);
+            let data = || Dataset::new(&x, t);
+            let refused = data().and_then(|data| checked.fit_map(map.clone(), &data));
             assert!(matches!(refused, Err(Error::Shape { .. })), "{refused:?}");
-            let refused = checked.prune_map(map, &x, t, Keep::Neurons(2), None);
+            let refused = data().and_then(|data| checked.prune_map(map, &data, Keep::Neurons(2)));
             assert!(matches!(refused, Err(Error::Shape { .. })), "{refused:?}");
         }
     }

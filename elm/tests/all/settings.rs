@@ -2,7 +2,7 @@
 
 use elm::solve::{Inverse, PseudoInverse, Ridge, Solver};
 use elm::tune::Trial;
-use elm::{Activation, Biases, Distribution, ElmParams, Kind, Neurons};
+use elm::{Activation, Biases, Distribution, ElmParams, NeuronGroup, NodeType};
 
 type Params = ElmParams<f64>;
 
@@ -19,19 +19,19 @@ fn refusal(text: &str) -> String {
 /// Every setting other than its default.
 fn unusual() -> Params {
     Params::new(7)
-        .activation(Activation::Sine)
-        .kind(Kind::Projection)
-        .biases(Biases::Scaled(0.5))
-        .and(Neurons::radial(3).scale(2.0))
-        .distribution(Distribution::StudentT(3))
-        .scale(0.1)
-        .input_scales(vec![1.0, 0.25])
-        .seed(u64::MAX)
-        .solver(Ridge::relative(1e-3).shared(true))
-        .intercept(false)
-        .standardise(false)
-        .direct_links(true)
-        .bounded(false)
+        .with_activation(Activation::Sine)
+        .with_node_type(NodeType::Additive)
+        .with_biases(Biases::Scaled(0.5))
+        .with_group(NeuronGroup::rbf(3).with_scale(2.0))
+        .with_distribution(Distribution::StudentT(3))
+        .with_scale(0.1)
+        .with_input_scales(vec![1.0, 0.25])
+        .with_seed(u64::MAX)
+        .with_solver(Ridge::relative(1e-3).with_shared(true))
+        .with_intercept(false)
+        .with_standardize(false)
+        .with_direct_links(true)
+        .with_bounded(false)
 }
 
 #[test]
@@ -40,10 +40,10 @@ fn what_is_missing_has_its_default() {
     let text = r#"{"neurons": 20, "activation": "tanh", "biases": "on-data",
                    "and": [{"count": 5}], "solver": {"ridge": {"shared": true}}}"#;
     let same = Params::new(20)
-        .activation(Activation::Tanh)
-        .biases(Biases::OnData)
-        .and(Neurons::new(5, Activation::default()))
-        .solver(Ridge::default().shared(true));
+        .with_activation(Activation::Tanh)
+        .with_biases(Biases::AtTrainingRows)
+        .with_group(NeuronGroup::new(5, Activation::default()))
+        .with_solver(Ridge::default().with_shared(true));
     assert_eq!(read(text), same);
     let error = refusal("{}");
     assert!(error.contains("missing field `neurons`"), "{error}");
@@ -114,8 +114,8 @@ fn what_is_written_is_read_again() {
     let nested = r#"{"neurons": {"count": 4, "activation": "tanh", "kind": "radial", "scale": 1.0,
                      "biases": "as-weights"}, "others": []}"#;
     let same = Params::new(4)
-        .activation(Activation::Tanh)
-        .kind(Kind::Radial);
+        .with_activation(Activation::Tanh)
+        .with_node_type(NodeType::Rbf);
     assert_eq!(read(nested), same);
 }
 
@@ -128,8 +128,8 @@ fn a_custom_activation_is_never_mistaken_for_a_built_in_one() {
         "{error}"
     );
     for params in [
-        Params::new(5).activation(own.clone()),
-        Params::new(5).and(Neurons::new(2, own)),
+        Params::new(5).with_activation(own.clone()),
+        Params::new(5).with_group(NeuronGroup::new(2, own)),
     ] {
         assert!(serde_json::to_string(&params).is_err());
         assert!(postcard::to_stdvec(&params).is_err());
@@ -139,17 +139,26 @@ fn a_custom_activation_is_never_mistaken_for_a_built_in_one() {
 #[test]
 fn numbers_that_json_has_no_place_for_are_refused_by_name() {
     for (params, name) in [
-        (Params::new(5).scale(f64::NAN), "scale"),
-        (Params::new(5).scale(f64::INFINITY), "scale"),
-        (Params::new(5).input_scales(vec![f64::NAN]), "input_scales"),
-        (Params::new(5).biases(Biases::Scaled(f64::NAN)), "biases"),
-        (Params::new(5).solver(Ridge::relative(f64::NAN)), "lambda"),
+        (Params::new(5).with_scale(f64::NAN), "scale"),
+        (Params::new(5).with_scale(f64::INFINITY), "scale"),
         (
-            Params::new(5).solver(PseudoInverse::with_cutoff(f64::NAN)),
+            Params::new(5).with_input_scales(vec![f64::NAN]),
+            "input_scales",
+        ),
+        (
+            Params::new(5).with_biases(Biases::Scaled(f64::NAN)),
+            "biases",
+        ),
+        (
+            Params::new(5).with_solver(Ridge::relative(f64::NAN)),
+            "lambda",
+        ),
+        (
+            Params::new(5).with_solver(PseudoInverse::with_cutoff(f64::NAN)),
             "cutoff",
         ),
         (
-            Params::new(5).and(Neurons::radial(2).scale(f64::NAN)),
+            Params::new(5).with_group(NeuronGroup::rbf(2).with_scale(f64::NAN)),
             "scale of neurons",
         ),
     ] {

@@ -1,7 +1,7 @@
 //! What must hold for every solver, whatever the matrix.
 //!
 //! Tolerances are a condition number times epsilon times a constant for the dimension, as the
-//! backward errors of Householder and LU factorisations are bounded by a small multiple of the
+//! backward errors of Householder and LU factorizations are bounded by a small multiple of the
 //! dimension times epsilon (Higham, Accuracy and Stability of Numerical Algorithms, 2002, ch. 9
 //! and 19).
 
@@ -13,7 +13,7 @@ use elm::{ElmParams, Scalar};
 use ndarray::{Array2, Axis, concatenate};
 use proptest::prelude::*;
 
-/// Bound of a factorisation's backward error, relative to the norm of the matrix.
+/// Bound of a factorization's backward error, relative to the norm of the matrix.
 fn backward_error<A: Scalar>(matrix: &Array2<A>) -> f64 {
     4.0 * (matrix.nrows() + matrix.ncols()) as f64 * A::epsilon().as_f64()
 }
@@ -83,7 +83,7 @@ fn normal_equations_hold<A: Scalar>(problem: &Problem<A>, solver: Solver) {
     }
 }
 
-/// Seventeen rows of which six count for nothing, and an intercept: rank 10 of 17. A factorisation
+/// Seventeen rows of which six count for nothing, and an intercept: rank 10 of 17. A factorization
 /// by QR leaves 20 epsilon in a direction that is not there.
 #[test]
 fn a_square_matrix_whose_rows_are_absent_in_part_is_not_of_full_rank() {
@@ -301,8 +301,8 @@ fn one_seed_gives_one_network_bit_for_bit() {
     for solver in all_least_squares() {
         let fit = |seed| {
             ElmParams::new(20)
-                .seed(seed)
-                .solver(solver)
+                .with_seed(seed)
+                .with_solver(solver)
                 .fit(&x, &t)
                 .unwrap()
         };

@@ -1,8 +1,8 @@
 //! Tuning: what it chooses is near the best there is, repeats itself, and keeps its budget.
 
 use elm::tune::Criterion;
-use elm::{Activation, ElmParams, Error, metrics};
-use ndarray::{Array1, Array2, Axis, array};
+use elm::{Activation, Dataset, ElmParams, Error, metrics};
+use ndarray::{Array1, Array2, Axis, Ix1, array};
 use ndarray_rand::RandomExt;
 use ndarray_rand::rand_distr::{StandardNormal, StandardUniform};
 use rand::SeedableRng;
@@ -17,20 +17,27 @@ fn wave(rows: usize, seed: u64) -> (Array2<f64>, Array1<f64>) {
     (x, t)
 }
 
-fn rmse(model: &elm::Elm<f64>, (x, t): &(Array2<f64>, Array1<f64>)) -> f64 {
-    metrics::rmse(&model.predict(x).unwrap().column(0), t).unwrap()
+fn rmse(model: &elm::Elm<f64, Ix1>, (x, t): &(Array2<f64>, Array1<f64>)) -> f64 {
+    metrics::rmse(&model.predict(x).unwrap(), t).unwrap()
 }
 
 #[test]
 fn the_chosen_scale_is_nearly_as_good_as_the_best_of_a_dense_grid() {
     let (train, test) = (wave(250, 1), wave(1000, 2));
-    let params = || ElmParams::new(80).activation(Activation::Tanh).seed(3);
-    let tuned = params().tuner().tune(&train.0, &train.1).unwrap();
+    let params = || {
+        ElmParams::new(80)
+            .with_activation(Activation::Tanh)
+            .with_seed(3)
+    };
+    let tuned = params()
+        .tuner()
+        .tune(&Dataset::new(&train.0, &train.1).unwrap())
+        .unwrap();
     let best = (-8..=8)
         .map(|step| {
             let scale = 10.0_f64.powf(f64::from(step) / 5.0);
             rmse(
-                &params().scale(scale).fit(&train.0, &train.1).unwrap(),
+                &params().with_scale(scale).fit(&train.0, &train.1).unwrap(),
                 &test,
             )
         })
@@ -42,12 +49,14 @@ fn the_chosen_scale_is_nearly_as_good_as_the_best_of_a_dense_grid() {
 #[test]
 fn a_scale_per_input_silences_inputs_that_say_nothing() {
     let (train, test) = (wave(250, 1), wave(1000, 2));
-    let tuner = ElmParams::new(80).activation(Activation::Tanh).tuner();
-    let shared = tuner.tune(&train.0, &train.1).unwrap();
+    let tuner = ElmParams::new(80).with_activation(Activation::Tanh).tuner();
+    let shared = tuner
+        .tune(&Dataset::new(&train.0, &train.1).unwrap())
+        .unwrap();
     let own = tuner
-        .per_input(true)
-        .budget(60)
-        .tune(&train.0, &train.1)
+        .with_per_input(true)
+        .with_budget(60)
+        .tune(&Dataset::new(&train.0, &train.1).unwrap())
         .unwrap();
     let scales = &own.best.input_scales;
     assert!(
@@ -63,14 +72,17 @@ fn neurons_are_doubled_only_while_that_pays() {
     // A straight line needs few; noise is no reason for more.
     let noise: Array1<f64> =
         Array1::random_using(400, StandardNormal, &mut ChaCha8Rng::seed_from_u64(6));
+    let straight = x.column(0).mapv(|x| 3.0 * x) + 0.1 * noise;
     let line = ElmParams::auto()
-        .tune(&x, &(x.column(0).mapv(|x| 3.0 * x) + 0.1 * noise))
+        .tune(&Dataset::new(&x, &straight).unwrap())
         .unwrap();
     assert!(line.best.neurons <= 200, "{}", line.best.neurons);
     // Many waves need many.
     let waves = x.column(0).mapv(|x| (150.0 * x).sin());
     let x = x.select(Axis(1), &[0]);
-    let waves = ElmParams::auto().tune(&x, &waves).unwrap();
+    let waves = ElmParams::auto()
+        .tune(&Dataset::new(&x, &waves).unwrap())
+        .unwrap();
     assert!(
         waves.best.neurons > line.best.neurons,
         "{}",
@@ -82,9 +94,12 @@ fn neurons_are_doubled_only_while_that_pays() {
 fn a_seed_repeats_the_search_and_the_budget_bounds_it() {
     let (x, t) = wave(120, 1);
     for budget in [1, 5, 12] {
-        let tuner = ElmParams::auto().seed(9).budget(budget).search_rows(100);
-        let first = tuner.tune(&x, &t).unwrap();
-        assert_eq!(first, tuner.tune(&x, &t).unwrap());
+        let tuner = ElmParams::auto()
+            .with_seed(9)
+            .with_budget(budget)
+            .with_search_rows(100);
+        let first = tuner.tune(&Dataset::new(&x, &t).unwrap()).unwrap();
+        assert_eq!(first, tuner.tune(&Dataset::new(&x, &t).unwrap()).unwrap());
         assert!(first.trials.len() <= budget);
         assert!(first.trials.contains(&first.best));
     }
@@ -93,7 +108,9 @@ fn a_seed_repeats_the_search_and_the_budget_bounds_it() {
 #[test]
 fn the_final_fit_is_that_of_the_reported_settings() {
     let (x, t) = wave(120, 1);
-    let tuned = ElmParams::auto().tune(&x, &t).unwrap();
+    let tuned = ElmParams::auto()
+        .tune(&Dataset::new(&x, &t).unwrap())
+        .unwrap();
     assert_eq!(tuned.params.fit(&x, &t).unwrap(), tuned.model);
     assert_eq!(ElmParams::auto().fit(&x, &t).unwrap(), tuned.model);
 }
@@ -104,10 +121,12 @@ fn k_fold_sees_through_rows_that_are_copies_of_each_other() {
     let twice = |a: &Array2<f64>| ndarray::concatenate(Axis(0), &[a.view(), a.view()]).unwrap();
     let (x, t) = (twice(&x), twice(&t.insert_axis(Axis(1))));
     let k_fold = ElmParams::auto()
-        .criterion(Criterion::KFold(5))
-        .tune(&x, &t)
+        .with_criterion(Criterion::KFold(5))
+        .tune(&Dataset::new(&x, &t).unwrap())
         .unwrap();
-    let one_out = ElmParams::auto().tune(&x, &t).unwrap();
+    let one_out = ElmParams::auto()
+        .tune(&Dataset::new(&x, &t).unwrap())
+        .unwrap();
     // With its copy still there a row is easily predicted.
     assert!(one_out.best.score < k_fold.best.score);
 }
@@ -143,11 +162,17 @@ fn bad_settings_are_named() {
     let (x, t) = wave(30, 1);
     let refuse = |tuner: elm::Tuner<f64>| tuner.fit(&x, &t).unwrap_err();
     for (tuner, expected) in [
-        (ElmParams::auto().budget(0), "budget"),
-        (ElmParams::auto().max_neurons(0), "max_neurons"),
-        (ElmParams::auto().search_rows(1), "search_rows"),
-        (ElmParams::auto().criterion(Criterion::KFold(1)), "folds"),
-        (ElmParams::auto().criterion(Criterion::KFold(31)), "folds"),
+        (ElmParams::auto().with_budget(0), "budget"),
+        (ElmParams::auto().with_max_neurons(0), "max_neurons"),
+        (ElmParams::auto().with_search_rows(1), "search_rows"),
+        (
+            ElmParams::auto().with_criterion(Criterion::KFold(1)),
+            "folds",
+        ),
+        (
+            ElmParams::auto().with_criterion(Criterion::KFold(31)),
+            "folds",
+        ),
         (ElmParams::new(0).tuner(), "neurons"),
     ] {
         let error = refuse(tuner);
@@ -176,15 +201,15 @@ fn best_of_grid(
     (x, t): &(Array2<f64>, Array1<f64>),
     test: &(Array2<f64>, Array1<f64>),
 ) -> f64 {
-    let centre = (x.ncols() as f64).sqrt().recip();
+    let center = (x.ncols() as f64).sqrt().recip();
     let mut best = f64::INFINITY;
     for step in -4..=4 {
         let params = params
             .clone()
-            .scale(centre * 10.0_f64.powf(f64::from(step) / 3.0));
+            .with_scale(center * 10.0_f64.powf(f64::from(step) / 3.0));
         for strength in -7..=0 {
             let ridge = elm::solve::Ridge::relative(10.0_f64.powi(strength));
-            let model = params.clone().solver(ridge).fit(x, t).unwrap();
+            let model = params.clone().with_solver(ridge).fit(x, t).unwrap();
             best = best.min(rmse(&model, test));
         }
     }
@@ -208,12 +233,12 @@ fn on_the_toy_problems_auto_and_the_tuner_are_within_a_tenth_of_the_best_of_a_de
         };
         let (train, test) = (data(300, seed), data(1000, seed + 1000));
         let given = ElmParams::new(200)
-            .activation(Activation::Tanh)
-            .biases(elm::Biases::OnData)
-            .seed(seed);
+            .with_activation(Activation::Tanh)
+            .with_biases(elm::Biases::AtTrainingRows)
+            .with_seed(seed);
         let best = best_of_grid(&given, &train, &test);
         for (subject, tuner) in [
-            ("auto", ElmParams::auto().seed(seed)),
+            ("auto", ElmParams::auto().with_seed(seed)),
             ("tuner", given.tuner()),
         ] {
             let ratio = rmse(&tuner.fit(&train.0, &train.1).unwrap(), &test) / best;

@@ -2,8 +2,8 @@
 
 use approx::assert_relative_eq;
 use elm::solve::{Lambda, LeastSquares, PseudoInverse, Ridge, Solver};
-use elm::{Activation, ElmParams, Error};
-use ndarray::{Array1, Array2, Axis, array};
+use elm::{Activation, Dataset, ElmParams, Error};
+use ndarray::{Array1, Array2, Axis, Ix1, array};
 use ndarray_rand::RandomExt;
 use ndarray_rand::rand_distr::{StandardNormal, StandardUniform};
 use rand::SeedableRng;
@@ -23,9 +23,9 @@ fn problem(rows: usize, noise: f64, seed: u64) -> (Array2<f64>, Array1<f64>) {
 
 fn params() -> ElmParams<f64> {
     ElmParams::new(25)
-        .activation(Activation::Tanh)
-        .scale(1.5)
-        .seed(2)
+        .with_activation(Activation::Tanh)
+        .with_scale(1.5)
+        .with_seed(2)
 }
 
 #[test]
@@ -34,15 +34,15 @@ fn the_deviation_is_that_of_the_ridge_posterior() {
     // condition^2 x eps, and lambda = 1e-4 keeps the squared condition below 1e5.
     let (x, t) = problem(60, 0.1, 1);
     let fitted = params()
-        .solver(Ridge::relative(1e-4))
-        .fit_uncertain(&x, &t)
+        .with_solver(Ridge::relative(1e-4))
+        .fit_uncertain(&Dataset::new(&x, &t).unwrap())
         .unwrap();
     let (new, _) = problem(5, 0.0, 9);
     let h = fitted.model().hidden_matrix(&x).unwrap();
     let mean = h.mean_axis(Axis(0)).unwrap();
-    let centred = &h - &mean;
+    let centered = &h - &mean;
     let lambda = 1e-4 * fitted.model().diagnosis().largest_singular_value.powi(2);
-    let gram = centred.t().dot(&centred) + Array2::<f64>::eye(25) * lambda;
+    let gram = centered.t().dot(&centered) + Array2::<f64>::eye(25) * lambda;
     let h_new = fitted.model().hidden_matrix(&new).unwrap() - &mean;
     let solution = Solver::from(PseudoInverse::default())
         .solve(&LeastSquares::new(&gram, &h_new.t()).unwrap());
@@ -50,19 +50,19 @@ fn the_deviation_is_that_of_the_ridge_posterior() {
     let deviation = fitted.predict_deviation(&new).unwrap();
     for row in 0..5 {
         let spread = 1.0 / 60.0 + h_new.row(row).dot(&inverse_times.column(row));
-        let expected = fitted.noise()[0] * (1.0 + spread).sqrt();
-        assert_relative_eq!(deviation[[row, 0]], expected, max_relative = 1e-9);
+        let expected = fitted.noise() * (1.0 + spread).sqrt();
+        assert_relative_eq!(deviation[row], expected, max_relative = 1e-9);
     }
 }
 
 #[test]
 fn intervals_are_those_of_refitting_without_each_row() {
-    // Jackknife+ of studentised residuals by its definition, at the same layer, scaling and absolute
+    // Jackknife+ of studentized residuals by its definition, at the same layer, scaling and absolute
     // lambda: the deviation is that of the fit without the row.
     let (x, t) = problem(24, 0.2, 3);
     let fitted = params()
-        .solver(Ridge::relative(1e-3))
-        .fit_uncertain(&x, &t)
+        .with_solver(Ridge::relative(1e-3))
+        .fit_uncertain(&Dataset::new(&x, &t).unwrap())
         .unwrap();
     let model = fitted.model();
     let absolute = 1e-3 * model.diagnosis().largest_singular_value.powi(2);
@@ -74,7 +74,9 @@ fn intervals_are_those_of_refitting_without_each_row() {
         let rest: Vec<usize> = (0..24).filter(|&row| row != left_out).collect();
         let (h_rest, t_rest) = (h.select(Axis(0), &rest), t.select(Axis(0), &rest));
         let t_rest = t_rest.insert_axis(Axis(1));
-        let problem = LeastSquares::new(&h_rest, &t_rest).unwrap().intercept(true);
+        let problem = LeastSquares::new(&h_rest, &t_rest)
+            .unwrap()
+            .with_intercept(true);
         let probe = Solver::from(Ridge::relative(1e-3)).solve(&problem).unwrap();
         let relative = absolute / probe.diagnosis.largest_singular_value.powi(2);
         let refit = Solver::from(Ridge::relative(relative))
@@ -84,8 +86,8 @@ fn intervals_are_those_of_refitting_without_each_row() {
             |h: ndarray::ArrayView1<'_, f64>| h.dot(&refit.beta.column(0)) + refit.intercept[0];
         let deviation = |row: ndarray::ArrayView1<'_, f64>| {
             let mean = h_rest.mean_axis(Axis(0)).unwrap();
-            let centred = &h_rest - &mean;
-            let gram = centred.t().dot(&centred) + Array2::<f64>::eye(h.ncols()) * absolute;
+            let centered = &h_rest - &mean;
+            let gram = centered.t().dot(&centered) + Array2::<f64>::eye(h.ncols()) * absolute;
             let row = (&row - &mean).insert_axis(Axis(1));
             let problem = LeastSquares::new(&gram, &row).unwrap();
             let solution = Solver::from(PseudoInverse::default()).solve(&problem);
@@ -101,8 +103,8 @@ fn intervals_are_those_of_refitting_without_each_row() {
     upper.sort_by(f64::total_cmp);
     // alpha (n + 1) = 0.2 * 25 = 5: the fifth from either end.
     let (low, high) = fitted.predict_interval(&new, 0.8).unwrap();
-    assert_relative_eq!(low[[0, 0]], lower[4], max_relative = 1e-9);
-    assert_relative_eq!(high[[0, 0]], upper[19], max_relative = 1e-9);
+    assert_relative_eq!(low[0], lower[4], max_relative = 1e-9);
+    assert_relative_eq!(high[0], upper[19], max_relative = 1e-9);
 }
 
 #[test]
@@ -114,8 +116,8 @@ fn intervals_and_deviations_cover_what_they_promise() {
         let (x, t) = problem(100, 0.2, 100 + seed);
         let (new, truth) = problem(200, 0.2, 1000 + seed);
         let fitted = params()
-            .solver(Ridge::leave_one_out())
-            .fit_uncertain(&x, &t)
+            .with_solver(Ridge::leave_one_out())
+            .fit_uncertain(&Dataset::new(&x, &t).unwrap())
             .unwrap();
         let predicted = fitted.model().predict(&new).unwrap();
         let deviation = fitted.predict_deviation(&new).unwrap();
@@ -123,9 +125,9 @@ fn intervals_and_deviations_cover_what_they_promise() {
         for row in 0..200 {
             let y = truth[row];
             count += 1;
-            inside_interval += usize::from(low[[row, 0]] <= y && y <= high[[row, 0]]);
+            inside_interval += usize::from(low[row] <= y && y <= high[row]);
             // 1.645: the two-sided 90 % point of the normal distribution.
-            let within = (y - predicted[[row, 0]]).abs() <= 1.645 * deviation[[row, 0]];
+            let within = (y - predicted[row]).abs() <= 1.645 * deviation[row];
             inside_deviation += usize::from(within);
         }
     }
@@ -139,11 +141,13 @@ fn intervals_and_deviations_cover_what_they_promise() {
 fn what_cannot_be_answered_is_an_error_or_infinite() {
     let (x, t) = problem(30, 0.1, 1);
     let plain = params()
-        .solver(PseudoInverse::default())
-        .fit_uncertain(&x, &t)
+        .with_solver(PseudoInverse::default())
+        .fit_uncertain(&Dataset::new(&x, &t).unwrap())
         .unwrap_err();
     assert!(matches!(plain, Error::Conflict { .. }), "{plain}");
-    let fitted = params().fit_uncertain(&x, &t).unwrap();
+    let fitted = params()
+        .fit_uncertain(&Dataset::new(&x, &t).unwrap())
+        .unwrap();
     assert!(matches!(Solver::default(), Solver::Ridge(r) if r.lambda() == Lambda::LeaveOneOut));
     for coverage in [0.0, 1.0, f64::NAN, -1.0] {
         let error = fitted.predict_interval(&x, coverage).unwrap_err();
@@ -164,7 +168,7 @@ fn what_cannot_be_answered_is_an_error_or_infinite() {
         low.iter().all(|v| *v == f64::NEG_INFINITY) && high.iter().all(|v| *v == f64::INFINITY)
     );
     let one = params()
-        .fit_uncertain(&array![[1.0]], &array![1.0])
+        .fit_uncertain(&Dataset::new(&array![[1.0]], &[1.0]).unwrap())
         .unwrap_err();
     assert!(matches!(one, Error::Undetermined { .. }), "{one}");
 }
@@ -172,11 +176,15 @@ fn what_cannot_be_answered_is_an_error_or_infinite() {
 #[test]
 fn an_ensemble_is_the_mean_of_its_members_and_leaves_rows_out_of_all_of_them() {
     let (x, t) = problem(40, 0.1, 1);
-    let mixed = params().and(elm::Neurons::radial(10)).direct_links(true);
-    let three = mixed.fit_ensemble(3, &x, &t).unwrap();
+    let mixed = params()
+        .with_group(elm::NeuronGroup::rbf(10))
+        .with_direct_links(true);
+    let three = mixed
+        .fit_ensemble(3, &Dataset::new(&x, &t).unwrap())
+        .unwrap();
     let (new, _) = problem(6, 0.0, 9);
-    let each: Vec<Array2<f64>> = (0..3)
-        .map(|number| mixed.clone().seed(2 + number).fit(&x, &t).unwrap())
+    let each: Vec<Array1<f64>> = (0..3)
+        .map(|number| mixed.clone().with_seed(2 + number).fit(&x, &t).unwrap())
         .map(|model| model.predict(&new).unwrap())
         .collect();
     let mean = (&each[0] + &each[1] + &each[2]) / 3.0;
@@ -186,11 +194,8 @@ fn an_ensemble_is_the_mean_of_its_members_and_leaves_rows_out_of_all_of_them() {
     assert_eq!(three.model().hidden().groups().len(), 2);
     assert_eq!(three.model().hidden().neurons(), 3 * 35);
     let spread = three.members_spread(&new).unwrap();
-    for ((row, _), &spread) in spread.indexed_iter() {
-        let squares: f64 = each
-            .iter()
-            .map(|y| (y[[row, 0]] - mean[[row, 0]]).powi(2))
-            .sum();
+    for (row, &spread) in spread.indexed_iter() {
+        let squares: f64 = each.iter().map(|y| (y[row] - mean[row]).powi(2)).sum();
         assert_relative_eq!(spread, (squares / 2.0).sqrt(), max_relative = 1e-6);
     }
     // By refitting without each row in turn, with the members' layers and strengths as they are.
@@ -202,7 +207,9 @@ fn an_ensemble_is_the_mean_of_its_members_and_leaves_rows_out_of_all_of_them() {
             let h = member.hidden_matrix(&x).unwrap();
             let (rows, targets) = (h.select(Axis(0), &kept), t.select(Axis(0), &kept));
             let targets = targets.insert_axis(Axis(1));
-            let problem = LeastSquares::new(&rows, &targets).unwrap().intercept(true);
+            let problem = LeastSquares::new(&rows, &targets)
+                .unwrap()
+                .with_intercept(true);
             let largest = Solver::from(Ridge::relative(1.0))
                 .solve(&problem)
                 .unwrap()
@@ -216,7 +223,7 @@ fn an_ensemble_is_the_mean_of_its_members_and_leaves_rows_out_of_all_of_them() {
         }
         squares += (t[row] - sum / 3.0).powi(2);
     }
-    let left_out = three.leave_one_out()[0];
+    let left_out = three.leave_one_out();
     assert_relative_eq!(left_out, (squares / 40.0_f64).sqrt(), max_relative = 1e-6);
     assert_eq!(
         three.model().diagnosis().leave_one_out,
@@ -234,25 +241,25 @@ fn an_ensemble_predicts_better_than_its_members_and_its_intervals_cover() {
     for seed in 0..SEEDS {
         let (x, t) = problem(60, 0.1, seed);
         let ten = params()
-            .scale(4.0)
-            .seed(seed)
-            .fit_ensemble(10, &x, &t)
+            .with_scale(4.0)
+            .with_seed(seed)
+            .fit_ensemble(10, &Dataset::new(&x, &t).unwrap())
             .unwrap();
-        let off = |model: &elm::Elm<f64>| {
+        let off = |model: &elm::Elm<f64, Ix1>| {
             let predicted = model.predict(&test_x).unwrap();
-            &predicted.column(0) - &test_t
+            predicted - &test_t
         };
         let square = |off: Array1<f64>| off.dot(&off) / 2000.0;
         let alone: f64 = ten.members().map(|m| square(off(m))).sum::<f64>() / 10.0;
         let mean = off(ten.model());
         assert!(square(mean.clone()) < alone);
-        left_out += ten.leave_one_out()[0].powi(2);
+        left_out += ten.leave_one_out().powi(2);
         held_out += square(mean.clone());
         let (low, high) = ten.predict_interval(&test_x, 0.8).unwrap();
-        let inside = |i: &usize| low[[*i, 0]] <= test_t[*i] && test_t[*i] <= high[[*i, 0]];
+        let inside = |i: &usize| low[*i] <= test_t[*i] && test_t[*i] <= high[*i];
         covered += (0..2000).filter(inside).count() as f64 / (2000 * SEEDS) as f64;
         let deviation = ten.predict_deviation(&test_x).unwrap();
-        let near = |i: &usize| mean[*i].abs() <= deviation[[*i, 0]];
+        let near = |i: &usize| mean[*i].abs() <= deviation[*i];
         within += (0..2000).filter(near).count() as f64 / (2000 * SEEDS) as f64;
     }
     let ratio = (left_out / held_out).sqrt();
@@ -265,9 +272,13 @@ fn an_ensemble_predicts_better_than_its_members_and_its_intervals_cover() {
 #[test]
 fn an_ensemble_of_one_is_the_network_and_of_none_an_error() {
     let (x, t) = problem(40, 0.1, 1);
-    let one = params().fit_ensemble(1, &x, &t).unwrap();
+    let one = params()
+        .fit_ensemble(1, &Dataset::new(&x, &t).unwrap())
+        .unwrap();
     assert_eq!(one.model(), &params().fit(&x, &t).unwrap());
-    let error = params().fit_ensemble(0, &x, &t).unwrap_err();
+    let error = params()
+        .fit_ensemble(0, &Dataset::new(&x, &t).unwrap())
+        .unwrap_err();
     assert!(
         matches!(
             error,
@@ -290,11 +301,13 @@ fn coverage_on_ten_rows(params: impl Fn(&Array2<f64>, &Array1<f64>) -> ElmParams
         let (x, new) = (x.slice(own).to_owned(), x.slice(new).to_owned());
         let (t, expected) = t.view().split_at(Axis(0), 10);
         let t = t.to_owned();
-        let fitted = params(&x, &t).fit_uncertain(&x, &t).unwrap();
+        let fitted = params(&x, &t)
+            .fit_uncertain(&Dataset::new(&x, &t).unwrap())
+            .unwrap();
         let (low, high) = fitted.predict_interval(&new, 0.9).unwrap();
         for (row, t) in expected.iter().enumerate() {
             all += 1;
-            covered += usize::from(low[[row, 0]] <= *t && *t <= high[[row, 0]]);
+            covered += usize::from(low[row] <= *t && *t <= high[row]);
         }
     }
     covered as f64 / all as f64
@@ -305,9 +318,14 @@ fn coverage_on_ten_rows(params: impl Fn(&Array2<f64>, &Array1<f64>) -> ElmParams
 /// documentation says what was found.
 #[test]
 fn intervals_on_ten_rows_cover_what_is_said() {
-    let given = coverage_on_ten_rows(|_, _| params().solver(Ridge::relative(1e-2)));
+    let given = coverage_on_ten_rows(|_, _| params().with_solver(Ridge::relative(1e-2)));
     let strength = coverage_on_ten_rows(|_, _| params());
-    let all = coverage_on_ten_rows(|x, t| ElmParams::auto().tune(x, t).unwrap().params);
+    let all = coverage_on_ten_rows(|x, t| {
+        ElmParams::auto()
+            .tune(&Dataset::new(x, t).unwrap())
+            .unwrap()
+            .params
+    });
     let found = format!("given {given}, strength chosen {strength}, all chosen {all}");
     assert!(given > 0.8 && strength > 0.76 && all > 0.65, "{found}");
 }

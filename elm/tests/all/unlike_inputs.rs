@@ -1,11 +1,10 @@
 //! Inputs that do not vary, hardly vary, or take two values; and scalers measured on the wrong rows.
 
 use crate::common::normal;
+use elm::advanced::FeatureMap;
 use elm::solve::Ridge;
-use elm::{
-    Accumulator, Biases, ElmParams, Error, FeatureMap, Scalar, Scaler, ScalerBuilder, metrics,
-};
-use ndarray::{Array1, Array2, ArrayRef2, Axis, array, s};
+use elm::{Accumulator, Biases, Dataset, ElmParams, Error, Scalar, Scaler, ScalerBuilder, metrics};
+use ndarray::{Array1, Array2, ArrayRef2, Axis, Ix1, array, s};
 
 /// Evenly spread over [-1, 1) without a pattern.
 fn spread(row: usize, step: f64) -> f64 {
@@ -15,9 +14,9 @@ fn spread(row: usize, step: f64) -> f64 {
 /// The golden ratio and a number independent of it.
 const STEPS: [f64; 2] = [0.618_033_988_749_895, 0.754_877_666_246_693];
 
-fn rmse<A: Scalar>(model: &elm::Elm<A>, x: &ArrayRef2<A>, t: &Array1<A>) -> f64 {
+fn rmse<A: Scalar>(model: &elm::Elm<A, Ix1>, x: &ArrayRef2<A>, t: &Array1<A>) -> f64 {
     let y = model.predict(x).unwrap();
-    metrics::rmse(&y.column(0), t).unwrap()
+    metrics::rmse(&y, t).unwrap()
 }
 
 #[test]
@@ -30,8 +29,8 @@ fn a_constant_input_is_ignored_whatever_the_number_of_rows() {
         let t = x.column(0).mapv(f64::sin);
         let at = array![[1.0, 0.1], [1.0, 0.1 + 1e-12], [1.0, 1e9]];
         for model in [
-            ElmParams::new(50).fit(&x, &t).unwrap().bounded(false),
-            ElmParams::auto().fit(&x, &t).unwrap().bounded(false),
+            ElmParams::new(50).fit(&x, &t).unwrap().with_bounded(false),
+            ElmParams::auto().fit(&x, &t).unwrap().with_bounded(false),
         ] {
             assert_eq!(model.scaler().unwrap().factor()[1], 0.0);
             for y in model.predict(&at).unwrap() {
@@ -86,16 +85,10 @@ fn a_million_rows_in_single_precision_are_fitted_as_in_double() {
     let rows = 200_000;
     let x = Array2::from_shape_fn((rows, 2), |(row, j)| 273.15 + spread(row, STEPS[j]));
     let t = x.map_axis(Axis(1), |row| 300.0 + ((row[0] - 273.15) * 3.0).sin());
-    let params = ElmParams::new(20)
-        .solver(Ridge::relative(1e-4))
-        .check()
-        .unwrap();
+    let params = ElmParams::new(20).with_solver(Ridge::relative(1e-4));
     let double = params.fit(&x, &t).unwrap();
     let narrow = |v: &f64| *v as f32;
-    let params = ElmParams::new(20)
-        .solver(Ridge::relative(1e-4))
-        .check()
-        .unwrap();
+    let params = ElmParams::new(20).with_solver(Ridge::relative(1e-4));
     let single = params.fit(&x.map(narrow), &t.map(narrow)).unwrap();
     let double = rmse(&double, &x, &t);
     let single = rmse(&single, &x.map(narrow), &t.map(narrow));
@@ -118,7 +111,7 @@ fn chunk(number: usize, silent: impl Fn(usize) -> f64) -> (Array2<f64>, Array2<f
 
 #[test]
 fn an_input_constant_in_the_sample_is_not_lost_without_a_word() {
-    let params = ElmParams::new(60).check().unwrap();
+    let params = ElmParams::new(60);
     let (x, t) = chunk(0, |_| 0.5);
     let mut rows = Accumulator::from_sample(&params, &x, 1).unwrap();
     rows.push(&x, &t).unwrap();
@@ -136,13 +129,16 @@ fn an_input_constant_in_the_sample_is_not_lost_without_a_word() {
     assert_eq!(refused, Err(expected));
     assert_eq!(rows, before);
     // Rows of weight 0 say nothing.
-    rows.push_weighted(&x, &t, &Array1::zeros(200)).unwrap();
+    rows.push_dataset(
+        &Dataset::new(&x, &t)
+            .unwrap()
+            .with_weights(&Array1::zeros(200))
+            .unwrap(),
+    )
+    .unwrap();
     // Who allows it, or ignores the input anyway, is not bothered.
-    rows.clone().unlike_rows(true).push(&x, &t).unwrap();
-    let ignoring = ElmParams::new(60)
-        .input_scales(vec![1.0, 0.0])
-        .check()
-        .unwrap();
+    rows.clone().with_unlike_rows(true).push(&x, &t).unwrap();
+    let ignoring = ElmParams::new(60).with_input_scales(vec![1.0, 0.0]);
     let mut ignoring = Accumulator::from_sample(&ignoring, &chunk(0, |_| 0.5).0, 1).unwrap();
     ignoring.push(&x, &t).unwrap();
 }
@@ -153,13 +149,14 @@ fn a_first_chunk_in_which_an_input_hardly_varies_is_noticed_and_can_be_mended() 
         |silent: fn(usize) -> f64| (0..20).map(move |number| Ok::<_, Error>(chunk(number, silent)));
     let (x, t): (Vec<_>, Vec<_>) = (20..25).map(|number| chunk(number, |_| 0.0)).unzip();
     let judge = |model: &elm::Elm<f64>| {
+        let model = model.clone().into_dimensionality().unwrap();
         let each = x
             .iter()
             .zip(&t)
-            .map(|(x, t)| rmse(model, x, &t.column(0).to_owned()));
+            .map(|(x, t)| rmse(&model, x, &t.column(0).to_owned()));
         each.fold(0.0, f64::max)
     };
-    let params = ElmParams::new(60).biases(Biases::OnData).check().unwrap();
+    let params = ElmParams::new(60).with_biases(Biases::AtTrainingRows);
     // A thousandth in one row of 200: a thousand times less than elsewhere.
     let hardly = |row: usize| if row == 100 { 1e-3 } else { 0.0 };
     let (first, t_first) = chunk(0, hardly);
@@ -198,7 +195,7 @@ fn a_first_chunk_in_which_an_input_hardly_varies_is_noticed_and_can_be_mended() 
 
 #[test]
 fn outliers_and_long_tails_are_no_other_distribution() {
-    let params = ElmParams::new(10).solver(Ridge::gcv()).check().unwrap();
+    let params = ElmParams::new(10).with_solver(Ridge::gcv());
     // Of a Student t of two degrees, whose variance does not exist.
     let (a, b) = (normal::<f64>(20_000, 1, 1), normal::<f64>(20_000, 2, 2));
     let lengths = b
@@ -242,10 +239,10 @@ fn a_category_of_many_levels_does_not_saturate_the_layer() {
     let mean = x.mean_axis(Axis(0)).unwrap();
     let deviations = Scaler::new(&mean, &x.std_axis(Axis(0), 0.0)).unwrap();
     for (links, bound) in [(false, 0.2), (true, 0.1)] {
-        let params = ElmParams::new(100).direct_links(links).check().unwrap();
-        let layer = params.params().feature_map().draw(51).unwrap();
+        let params = ElmParams::new(100).with_direct_links(links);
+        let layer = params.feature_map().draw(51).unwrap();
         let map = FeatureMap::new(Some(deviations.clone()), layer, links).unwrap();
-        let blown_up = params.fit_map(map, &x, &t, None);
+        let blown_up = params.fit_map(map, &Dataset::new(&x, &t).unwrap());
         let blown_up = rmse(&blown_up.unwrap(), &test, &truth);
         let error = rmse(&params.fit(&x, &t).unwrap(), &test, &truth);
         // 51 coefficients alone cost the noise of 0.22 times the root of 51 / 1000, 0.05.

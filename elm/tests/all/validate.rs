@@ -1,10 +1,10 @@
 //! Held-out predictions in closed form are those of refitting.
 
 use crate::common::{Problem, doubled_rows, frobenius, normal, problems, weights};
+use elm::cross_validation::{CrossValidator, assign_folds};
 use elm::solve::{Inverse, LeastSquares, PseudoInverse, Ridge, Solver};
-use elm::validate::{Validator, assign_folds};
-use elm::{ElmParams, Error, Scalar, metrics};
-use ndarray::{Array2, Axis, array};
+use elm::{Dataset, ElmParams, Error, Scalar, metrics};
+use ndarray::{Array1, Array2, Axis, array};
 
 /// Divisions into folds of every kind: single rows, a few rows, halves, and one that is large
 /// beside single ones, under labels that are just names.
@@ -44,7 +44,7 @@ fn k_fold_is_refitting<A: Scalar>(lambdas: &[f64], limit: impl Fn(f64) -> f64) {
         if rows < 2 {
             continue;
         }
-        let validator = Validator::new(&problem.view()).unwrap();
+        let validator = CrossValidator::new(&problem.view()).unwrap();
         let s = problem
             .solve(Ridge::relative(1.0))
             .diagnosis
@@ -68,7 +68,7 @@ fn k_fold_is_refitting<A: Scalar>(lambdas: &[f64], limit: impl Fn(f64) -> f64) {
 #[test]
 fn k_fold_predictions_are_those_of_refitting_without_each_fold() {
     k_fold_is_refitting::<f64>(&[1e-6, 1e-2, 10.0], |_| 1e-9);
-    // The condition of the regularised equations is at most 1 / lambda.
+    // The condition of the regularized equations is at most 1 / lambda.
     k_fold_is_refitting::<f64>(&[1e-10], |lambda| 4.0 * f64::EPSILON / lambda);
     k_fold_is_refitting::<f32>(&[1e-3, 1.0], |lambda| {
         4.0 * f64::from(f32::EPSILON) / lambda.min(0.1)
@@ -82,7 +82,7 @@ fn the_fits_without_each_fold_are_those_of_refitting_on_all_rows() {
         if rows < 2 {
             continue;
         }
-        let validator = Validator::new(&problem.view()).unwrap();
+        let validator = CrossValidator::new(&problem.view()).unwrap();
         let s = problem
             .solve(Ridge::relative(1.0))
             .diagnosis
@@ -92,11 +92,15 @@ fn the_fits_without_each_fold_are_those_of_refitting_on_all_rows() {
             divisions.map(move |folds| (lambda, folds))
         }) {
             let held_out = validator.k_fold(&folds, &[lambda]).unwrap();
-            let fits = validator.k_fold_fits(&folds, &[lambda]).unwrap();
+            let fits = validator.fold_predictions(&folds, &[lambda]).unwrap();
             let mut labels = folds.clone();
             labels.sort_unstable();
             labels.dedup();
-            assert!(fits.iter().map(elm::validate::FoldFit::label).eq(labels));
+            assert!(
+                fits.iter()
+                    .map(elm::cross_validation::FoldPredictions::label)
+                    .eq(labels)
+            );
             for fit in &fits {
                 let out: Vec<usize> = (0..rows).filter(|&r| folds[r] == fit.label()).collect();
                 for &row in &out {
@@ -125,7 +129,7 @@ fn the_fits_without_each_fold_are_those_of_refitting_on_all_rows() {
 fn leave_one_out_is_k_fold_with_one_row_in_each_fold() {
     for (name, problem) in problems::<f64>() {
         let rows = problem.hidden.nrows();
-        let validator = Validator::new(&problem.view()).unwrap();
+        let validator = CrossValidator::new(&problem.view()).unwrap();
         let each: Vec<usize> = (0..rows).collect();
         for lambda in [1e-8, 1e-3, 1.0] {
             let one = validator.leave_one_out(&[lambda]).unwrap();
@@ -149,7 +153,7 @@ fn the_pseudo_inverse_is_validated_where_the_rows_left_determine_it() {
         if !spare || name.contains("of its own") {
             continue;
         }
-        let validator = Validator::new(&problem.view()).unwrap();
+        let validator = CrossValidator::new(&problem.view()).unwrap();
         for folds in [(0..rows).collect(), assign_folds(rows, 4, 1).unwrap()] {
             let held_out = validator.k_fold(&folds, &[0.0]).unwrap();
             for (row, &label) in folds.iter().enumerate() {
@@ -169,7 +173,7 @@ fn the_pseudo_inverse_is_validated_where_the_rows_left_determine_it() {
 fn a_fold_that_the_other_rows_do_not_determine_is_named() {
     // Twelve rows and thirty neurons: every row is interpolated.
     let wide = Problem::noisy(normal::<f64>(12, 30, 4), 1, 1.0, 5);
-    let validator = Validator::new(&wide.view()).unwrap();
+    let validator = CrossValidator::new(&wide.view()).unwrap();
     assert_eq!(
         validator.leave_one_out(&[0.0]).unwrap_err(),
         Error::Undetermined { fold: 0 }
@@ -179,7 +183,7 @@ fn a_fold_that_the_other_rows_do_not_determine_is_named() {
     own.column_mut(2).fill(0.0);
     own[[3, 2]] = 1.0;
     let own = Problem::noisy(own, 1, 1.0, 2);
-    let validator = Validator::new(&own.view()).unwrap();
+    let validator = CrossValidator::new(&own.view()).unwrap();
     assert_eq!(
         validator.leave_one_out(&[0.0]).unwrap_err(),
         Error::Undetermined { fold: 3 }
@@ -197,7 +201,7 @@ fn a_fold_that_the_other_rows_do_not_determine_is_named() {
     }
     // Without any row there is nothing to place an intercept by, however strong the ridge.
     let all = Problem::noisy(normal::<f64>(20, 3, 4), 1, 1.0, 5).with_intercept();
-    let validator = Validator::new(&all.view()).unwrap();
+    let validator = CrossValidator::new(&all.view()).unwrap();
     assert_eq!(
         validator.k_fold(&[5; 20], &[1.0]).unwrap_err(),
         Error::Undetermined { fold: 5 }
@@ -207,7 +211,7 @@ fn a_fold_that_the_other_rows_do_not_determine_is_named() {
 #[test]
 fn without_any_row_ridge_predicts_zero() {
     let problem = Problem::noisy(normal::<f64>(20, 3, 4), 2, 1.0, 5);
-    let validator = Validator::new(&problem.view()).unwrap();
+    let validator = CrossValidator::new(&problem.view()).unwrap();
     let held_out = validator.k_fold(&[5; 20], &[0.1]).unwrap();
     assert!(frobenius(&held_out.predictions().to_owned()) < 1e-13);
 }
@@ -215,7 +219,7 @@ fn without_any_row_ridge_predicts_zero() {
 #[test]
 fn each_output_may_have_its_own_strength() {
     let problem = Problem::noisy(normal::<f64>(30, 6, 1), 3, 1.0, 2).with_intercept();
-    let validator = Validator::new(&problem.view()).unwrap();
+    let validator = CrossValidator::new(&problem.view()).unwrap();
     let folds = assign_folds(30, 5, 1).unwrap();
     let lambdas = [1e-4, 1.0, 1e-4];
     let mixed = validator.k_fold(&folds, &lambdas).unwrap();
@@ -232,7 +236,7 @@ fn each_output_may_have_its_own_strength() {
 #[test]
 fn scores_are_weighted_root_mean_squares_of_the_residuals() {
     let problem = Problem::noisy(normal::<f64>(30, 6, 1), 2, 1.0, 2).with_intercept();
-    let validator = Validator::new(&problem.view()).unwrap();
+    let validator = CrossValidator::new(&problem.view()).unwrap();
     let held_out = validator.leave_one_out(&[1e-3]).unwrap();
     for output in 0..2 {
         let rmse = metrics::rmse(
@@ -251,11 +255,11 @@ fn scores_are_weighted_root_mean_squares_of_the_residuals() {
     };
     let twice_folds = [folds.clone(), folds.clone()].concat();
     let weighted = problem.weighted(ndarray::Array1::from_elem(30, 2.0));
-    let one = Validator::new(&weighted.view())
+    let one = CrossValidator::new(&weighted.view())
         .unwrap()
         .k_fold(&folds, &[1e-3])
         .unwrap();
-    let other = Validator::new(&twice.view())
+    let other = CrossValidator::new(&twice.view())
         .unwrap()
         .k_fold(&twice_folds, &[1e-3])
         .unwrap();
@@ -267,14 +271,14 @@ fn scores_are_weighted_root_mean_squares_of_the_residuals() {
 #[test]
 fn a_path_has_the_scores_of_its_strengths_and_finds_the_best() {
     let problem = Problem::noisy(normal::<f64>(30, 20, 1), 2, 3.0, 2).weighted(weights(30, 3));
-    let validator = Validator::new(&problem.view()).unwrap();
+    let validator = CrossValidator::new(&problem.view()).unwrap();
     let folds = assign_folds(30, 5, 1).unwrap();
-    let lambdas = Ridge::candidates();
+    let lambdas = Ridge::lambda_grid();
     for (path, score) in [
         (
             validator.k_fold_path(&folds, &lambdas).unwrap(),
             Box::new(|l: f64| validator.k_fold(&folds, &[l]).unwrap().rmse())
-                as Box<dyn Fn(f64) -> Vec<f64>>,
+                as Box<dyn Fn(f64) -> Array1<f64>>,
         ),
         (
             validator.leave_one_out_path(&lambdas).unwrap(),
@@ -283,7 +287,7 @@ fn a_path_has_the_scores_of_its_strengths_and_finds_the_best() {
     ] {
         assert_eq!(path.lambdas(), lambdas);
         for (row, &lambda) in path.rmse().rows().into_iter().zip(&lambdas) {
-            assert_eq!(row.to_vec(), score(lambda));
+            assert_eq!(row, score(lambda));
         }
         for (output, best) in path.best().into_iter().enumerate() {
             let smallest = path
@@ -297,7 +301,7 @@ fn a_path_has_the_scores_of_its_strengths_and_finds_the_best() {
     // The path of leave-one-out is what ridge chooses by.
     assert_eq!(
         validator.leave_one_out_path(&lambdas).unwrap().best(),
-        validator.strengths(Ridge::leave_one_out()).unwrap()
+        validator.select_lambda(Ridge::leave_one_out()).unwrap()
     );
 }
 
@@ -306,16 +310,16 @@ fn a_network_is_cross_validated_as_if_refitted_fold_by_fold() {
     let x = normal::<f64>(50, 3, 1);
     let t = x.map_axis(Axis(1), |row| (row[0] + row[1] * row[2]).sin());
     let folds = assign_folds(50, 5, 2).unwrap();
-    // Standardised beforehand, which is what the closed form does: every fold has one layer.
+    // Standardized beforehand, which is what the closed form does: every fold has one layer.
     for solver in [Ridge::relative(1e-4), Ridge::leave_one_out()] {
-        let params = ElmParams::new(20).standardise(false).solver(solver);
+        let params = ElmParams::new(20)
+            .with_standardize(false)
+            .with_solver(solver);
         let full = params.fit(&x, &t).unwrap();
         let d = full.diagnosis();
         let absolute = d.lambda[0] * d.largest_singular_value.powi(2);
         let held_out = params
-            .check()
-            .unwrap()
-            .cross_validate(&x, &t, &folds)
+            .cross_val_predict(&Dataset::new(&x, &t).unwrap(), &folds)
             .unwrap();
         for label in 0..5 {
             let pick = |inside: bool| -> Vec<usize> {
@@ -326,9 +330,11 @@ fn a_network_is_cross_validated_as_if_refitted_fold_by_fold() {
             let (kept, out) = (pick(false), pick(true));
             let (x_kept, t_kept) = (x.select(Axis(0), &kept), t.select(Axis(0), &kept));
             let fit = |lambda| {
-                let params = ElmParams::new(20).standardise(false).bounded(false);
+                let params = ElmParams::new(20)
+                    .with_standardize(false)
+                    .with_bounded(false);
                 params
-                    .solver(Ridge::relative(lambda))
+                    .with_solver(Ridge::relative(lambda))
                     .fit(&x_kept, &t_kept)
                     .unwrap()
             };
@@ -350,11 +356,11 @@ fn what_has_no_closed_form_or_no_sense_is_an_error() {
     let (x, t) = (normal::<f64>(10, 2, 1), normal::<f64>(10, 1, 2));
     let folds = assign_folds(10, 5, 0).unwrap();
     let validate = |params: ElmParams<f64>, folds: &[usize]| {
-        params.check().unwrap().cross_validate(&x, &t, folds)
+        params.cross_val_predict(&Dataset::new(&x, &t).unwrap(), folds)
     };
     for params in [
-        ElmParams::new(10).solver(Inverse),
-        ElmParams::new(3).solver(PseudoInverse::with_cutoff(1e-3)),
+        ElmParams::new(10).with_solver(Inverse),
+        ElmParams::new(3).with_solver(PseudoInverse::with_cutoff(1e-3)),
     ] {
         assert!(matches!(
             validate(params, &folds),
@@ -370,7 +376,7 @@ fn what_has_no_closed_form_or_no_sense_is_an_error() {
         })
     ));
     let problem = Problem::new(x.clone(), t.clone());
-    let validator = Validator::new(&problem.view()).unwrap();
+    let validator = CrossValidator::new(&problem.view()).unwrap();
     for bad in [-1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(
             validator.leave_one_out(&[bad]),
@@ -390,7 +396,7 @@ fn what_has_no_closed_form_or_no_sense_is_an_error() {
         Err(Error::Empty { .. })
     ));
     assert!(matches!(
-        validator.strengths(Ridge::relative(-1.0)),
+        validator.select_lambda(Ridge::relative(-1.0)),
         Err(Error::Parameter { .. })
     ));
     for folds in [0, 1, 11] {
@@ -415,7 +421,7 @@ fn folds_are_balanced_and_repeatable() {
 fn values_at_the_ends_of_the_range_are_validated_alike() {
     let problem = Problem::noisy(normal::<f64>(30, 6, 1), 2, 1.0, 2).with_intercept();
     let folds = assign_folds(30, 5, 1).unwrap();
-    let truth = Validator::new(&problem.view())
+    let truth = CrossValidator::new(&problem.view())
         .unwrap()
         .k_fold(&folds, &[1e-3])
         .unwrap();
@@ -424,7 +430,7 @@ fn values_at_the_ends_of_the_range_are_validated_alike() {
         let mut scaled = problem.clone();
         scaled.hidden *= factor;
         scaled.targets *= factor;
-        let found = Validator::new(&scaled.view())
+        let found = CrossValidator::new(&scaled.view())
             .unwrap()
             .k_fold(&folds, &[1e-3])
             .unwrap();
@@ -432,24 +438,21 @@ fn values_at_the_ends_of_the_range_are_validated_alike() {
             found.predictions().mapv(|p| p / factor),
             truth.predictions()
         );
-        assert_eq!(
-            found.rmse(),
-            truth.rmse().iter().map(|r| r * factor).collect::<Vec<_>>()
-        );
+        assert_eq!(found.rmse(), truth.rmse() * factor);
     }
     // A perfect fit of nothing.
     let zero = Problem::new(array![[1.0], [2.0], [4.0]], Array2::zeros((3, 1)));
-    let held_out = Validator::new(&zero.view())
+    let held_out = CrossValidator::new(&zero.view())
         .unwrap()
         .leave_one_out(&[1e-3])
         .unwrap();
-    assert_eq!(held_out.rmse(), [0.0]);
+    assert_eq!(held_out.rmse(), array![0.0]);
 }
 
 #[test]
 fn a_validator_solves_as_ridge_does() {
     for (name, problem) in problems::<f64>() {
-        let validator = Validator::new(&problem.view()).unwrap();
+        let validator = CrossValidator::new(&problem.view()).unwrap();
         for lambda in [1e-10, 1e-3] {
             let (found, truth) = (
                 validator.solve(&[lambda]).unwrap(),
@@ -463,7 +466,7 @@ fn a_validator_solves_as_ridge_does() {
     }
 }
 
-/// Lower triangle of the Cholesky factorisation, by the textbook.
+/// Lower triangle of the Cholesky factorization, by the textbook.
 fn cholesky(a: &Array2<f64>) -> Array2<f64> {
     let mut l = Array2::<f64>::zeros(a.dim());
     for i in 0..a.nrows() {
@@ -496,8 +499,8 @@ fn evidence_is_the_density_of_the_targets_under_the_model_that_ridge_stands_for(
             100.0 + ((i * (o + 3)) as f64 * 0.9).cos()
         });
         for intercept in [false, true] {
-            let problem = LeastSquares::new(&h, &t).unwrap().intercept(intercept);
-            let validator = Validator::new(&problem).unwrap();
+            let problem = LeastSquares::new(&h, &t).unwrap().with_intercept(intercept);
+            let validator = CrossValidator::new(&problem).unwrap();
             let largest = Solver::from(Ridge::relative(1.0))
                 .solve(&problem)
                 .unwrap()
@@ -539,7 +542,7 @@ fn evidence_is_the_density_of_the_targets_under_the_model_that_ridge_stands_for(
 #[test]
 fn evidence_needs_a_strength_and_a_row_to_judge() {
     let (h, t) = (array![[1.0], [2.0]], array![[1.0], [3.0]]);
-    let validator = Validator::new(&LeastSquares::new(&h, &t).unwrap()).unwrap();
+    let validator = CrossValidator::new(&LeastSquares::new(&h, &t).unwrap()).unwrap();
     for lambda in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(
             validator.log_evidence(&[lambda]),
@@ -551,9 +554,9 @@ fn evidence_needs_a_strength_and_a_row_to_judge() {
         Err(Error::Shape { .. })
     ));
     let one = array![[1.0]];
-    let alone = LeastSquares::new(&one, &one).unwrap().intercept(true);
+    let alone = LeastSquares::new(&one, &one).unwrap().with_intercept(true);
     assert!(matches!(
-        Validator::new(&alone).unwrap().log_evidence(&[1.0]),
+        CrossValidator::new(&alone).unwrap().log_evidence(&[1.0]),
         Err(Error::Undetermined { .. })
     ));
 }

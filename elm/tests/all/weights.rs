@@ -1,11 +1,12 @@
 //! A row of weight 0 is no row, one of weight 2 is two, and a factor of all weights says nothing.
 
 use crate::common::{normal, weights};
+use elm::advanced::FeatureMap;
+use elm::cross_validation::CrossValidator;
 use elm::prune::Keep;
 use elm::solve::{LeastSquares, PseudoInverse, Ridge, Solver};
-use elm::validate::Validator;
 use elm::{
-    Accumulator, Activation, Biases, ElmParams, FeatureMap, Neurons, Scalar, Scaler, ScalerBuilder,
+    Accumulator, Activation, Biases, Dataset, ElmParams, NeuronGroup, Scalar, Scaler, ScalerBuilder,
 };
 use ndarray::{Array1, Array2, Axis, s};
 use proptest::prelude::*;
@@ -48,14 +49,20 @@ impl<A: Scalar> Masked<A> {
 }
 
 fn settings<A: Scalar>() -> Vec<ElmParams<A>> {
-    let plain = ElmParams::new(12).solver(Ridge::relative(1e-3));
+    let plain = ElmParams::new(12).with_solver(Ridge::relative(1e-3));
     vec![
         plain.clone(),
         ElmParams::new(12),
-        plain.clone().solver(PseudoInverse::default()),
-        plain.clone().solver(Ridge::gcv()).intercept(false),
-        plain.clone().biases(Biases::OnData).direct_links(true),
-        plain.and(Neurons::radial(8)),
+        plain.clone().with_solver(PseudoInverse::default()),
+        plain
+            .clone()
+            .with_solver(Ridge::gcv())
+            .with_intercept(false),
+        plain
+            .clone()
+            .with_biases(Biases::AtTrainingRows)
+            .with_direct_links(true),
+        plain.with_group(NeuronGroup::rbf(8)),
     ]
 }
 
@@ -63,18 +70,29 @@ fn every_route_omits_rows_of_no_weight<A: Scalar>(masked: &Masked<A>) {
     let (x, t, w) = masked.omitted();
     let scaler = Scaler::measured(&x).unwrap();
     for params in settings::<A>() {
-        let params = params.check().unwrap();
-        let fitted = params.fit_weighted(&masked.x, &masked.t, Some(masked.w.view()));
-        let expected = params.fit_weighted(&x, &t, Some(w.view())).unwrap();
+        let params = params;
+        let fitted = params.fit_dataset(
+            &Dataset::new(&masked.x, &masked.t)
+                .unwrap()
+                .with_weights(&masked.w)
+                .unwrap(),
+        );
+        let expected = params
+            .fit_dataset(&Dataset::new(&x, &t).unwrap().with_weights(&w).unwrap())
+            .unwrap();
         assert_eq!(fitted.unwrap(), expected);
         let ones = Array1::ones(x.nrows());
-        let unweighted = params.fit_weighted(&x, &t, Some(ones.view()));
+        let unweighted =
+            params.fit_dataset(&Dataset::new(&x, &t).unwrap().with_weights(&ones).unwrap());
         assert_eq!(unweighted.unwrap(), params.fit(&x, &t).unwrap());
-        if let Ok(layer) = params.params().feature_map().draw(3) {
-            let links = params.params().feature_map().neurons() < expected.beta().nrows();
+        if let Ok(layer) = params.feature_map().draw(3) {
+            let links = params.feature_map().neurons() < expected.beta().nrows();
             let map = FeatureMap::new(Some(scaler.clone()), layer, links).unwrap();
             let fit = |x: &Array2<A>, t: &Array2<A>, w: &Array1<A>| {
-                params.fit_map(map.clone(), x, t, Some(w.view()))
+                params.fit_map(
+                    map.clone(),
+                    &Dataset::new(x, t).unwrap().with_weights(w).unwrap(),
+                )
             };
             assert_eq!(
                 fit(&masked.x, &masked.t, &masked.w).unwrap(),
@@ -82,17 +100,21 @@ fn every_route_omits_rows_of_no_weight<A: Scalar>(masked: &Masked<A>) {
             );
         }
     }
-    let params = ElmParams::new(12).biases(Biases::OnData).check().unwrap();
+    let params = ElmParams::new(12).with_biases(Biases::AtTrainingRows);
     for keep in [Keep::Neurons(5), Keep::Loss(0.1)] {
-        let weights = Some(masked.w.view());
-        let pruned = params.fit_pruned_weighted(&masked.x, &masked.t, keep, weights);
-        let expected = params.fit_pruned_weighted(&x, &t, keep, Some(w.view()));
+        let data = Dataset::new(&masked.x, &masked.t).unwrap();
+        let pruned = params.fit_pruned(&data.with_weights(&masked.w).unwrap(), keep);
+        let expected = params.fit_pruned(
+            &Dataset::new(&x, &t).unwrap().with_weights(&w).unwrap(),
+            keep,
+        );
         assert_eq!(pruned.unwrap(), expected.unwrap());
     }
-    let params = ElmParams::new(12).solver(Ridge::gcv()).check().unwrap();
+    let params = ElmParams::new(12).with_solver(Ridge::gcv());
     let accumulate = |x: &Array2<A>, t: &Array2<A>, w: &Array1<A>| {
         let mut rows = Accumulator::with_scaler(&params, scaler.clone(), 1).unwrap();
-        rows.push_weighted(x, t, w).unwrap();
+        rows.push_dataset(&Dataset::new(x, t).unwrap().with_weights(w).unwrap())
+            .unwrap();
         rows.fit().unwrap()
     };
     let expected = accumulate(&x, &t, &w);
@@ -140,18 +162,16 @@ proptest! {
             .flat_map(|row| std::iter::repeat_n(row, counts[row]))
             .collect();
         let (many_x, many_t) = (x.select(Axis(0), &repeated), t.select(Axis(0), &repeated));
-        for biases in [Biases::AsWeights, Biases::OnData] {
+        for biases in [Biases::AsWeights, Biases::AtTrainingRows] {
             let params = ElmParams::new(10)
-                .biases(biases)
-                .activation(Activation::Tanh)
-                .solver(Ridge::relative(1e-6))
-                .check()
-                .unwrap();
+                .with_biases(biases)
+                .with_activation(Activation::Tanh)
+                .with_solver(Ridge::relative(1e-6));
             let expected = params.fit(&many_x, &many_t).unwrap().predict(&x).unwrap();
             // A factor of all weights says nothing.
             for factor in [1.0, 3.0, 1e-200, 1e200] {
                 let w = &w * factor;
-                let found = params.fit_weighted(&x, &t, Some(w.view())).unwrap();
+                let found = params.fit_dataset(&Dataset::new(&x, &t).unwrap().with_weights(&w).unwrap()).unwrap();
                 let found = found.predict(&x).unwrap();
                 let apart = (&found - &expected).fold(0.0, |m: f64, d| m.max(d.abs()));
                 // Rounding, times 1 / lambda.
@@ -175,19 +195,29 @@ fn a_problem_with_rows_of_no_weight_is_that_without_them() {
         Ridge::gcv().into(),
         Ridge::leave_one_out().into(),
     ] {
-        let problem = LeastSquares::new(&h, &masked.t).unwrap().intercept(true);
-        let omitted = LeastSquares::new(&few, &t).unwrap().intercept(true);
-        let one = solver.solve(&problem.weights(&masked.w).unwrap()).unwrap();
-        let other = solver.solve(&omitted.weights(&w).unwrap()).unwrap();
+        let problem = LeastSquares::new(&h, &masked.t)
+            .unwrap()
+            .with_intercept(true);
+        let omitted = LeastSquares::new(&few, &t).unwrap().with_intercept(true);
+        let one = solver
+            .solve(&problem.with_weights(&masked.w).unwrap())
+            .unwrap();
+        let other = solver.solve(&omitted.with_weights(&w).unwrap()).unwrap();
         assert_eq!(one, other, "{solver}");
     }
     let problem = LeastSquares::new(&h, &masked.t).unwrap();
-    let problem = problem.weights(&masked.w).unwrap().intercept(true);
-    let omitted = LeastSquares::new(&few, &t).unwrap().weights(&w).unwrap();
-    let all = Validator::new(&problem).unwrap();
-    let some = Validator::new(&omitted.intercept(true)).unwrap();
-    let lambda = some.strengths(Ridge::leave_one_out()).unwrap();
-    assert_eq!(all.strengths(Ridge::leave_one_out()).unwrap(), lambda);
+    let problem = problem
+        .with_weights(&masked.w)
+        .unwrap()
+        .with_intercept(true);
+    let omitted = LeastSquares::new(&few, &t)
+        .unwrap()
+        .with_weights(&w)
+        .unwrap();
+    let all = CrossValidator::new(&problem).unwrap();
+    let some = CrossValidator::new(&omitted.with_intercept(true)).unwrap();
+    let lambda = some.select_lambda(Ridge::leave_one_out()).unwrap();
+    assert_eq!(all.select_lambda(Ridge::leave_one_out()).unwrap(), lambda);
     let (all, some) = (
         all.leave_one_out(&lambda).unwrap(),
         some.leave_one_out(&lambda).unwrap(),
@@ -204,13 +234,11 @@ fn heavy_rows_draw_neurons_to_them() {
     w[1000] = 1000.0;
     let t = x.mapv(|x: f64| x + 1.0);
     let params = ElmParams::new(1)
-        .and(Neurons::new(400, Activation::Tanh).biases(Biases::OnData))
-        .standardise(false)
-        .solver(Ridge::relative(1e-3));
+        .with_group(NeuronGroup::new(400, Activation::Tanh).with_biases(Biases::AtTrainingRows))
+        .with_standardize(false)
+        .with_solver(Ridge::relative(1e-3));
     let model = params
-        .check()
-        .unwrap()
-        .fit_weighted(&x, &t, Some(w.view()))
+        .fit_dataset(&Dataset::new(&x, &t).unwrap().with_weights(&w).unwrap())
         .unwrap();
     let layer = model.hidden();
     let at_one = (1..401).filter(|&k| layer.biases()[k] != 0.0).count();
@@ -219,11 +247,13 @@ fn heavy_rows_draw_neurons_to_them() {
     // None twice, and the heavy one among the first of nearly every seed.
     let first = |seed: u64| {
         let params = ElmParams::new(1)
-            .seed(seed)
-            .standardise(false)
-            .and(Neurons::radial(3));
-        let params = params.solver(Ridge::relative(1e-3)).check().unwrap();
-        let model = params.fit_weighted(&x, &t, Some(w.view())).unwrap();
+            .with_seed(seed)
+            .with_standardize(false)
+            .with_group(NeuronGroup::rbf(3));
+        let params = params.with_solver(Ridge::relative(1e-3));
+        let model = params
+            .fit_dataset(&Dataset::new(&x, &t).unwrap().with_weights(&w).unwrap())
+            .unwrap();
         model.hidden().weights().slice(s![0, 1..]).sum()
     };
     let sums: Vec<f64> = (0..40).map(first).collect();

@@ -2,8 +2,8 @@
 
 use elm::persist::{self, Persist};
 use elm::solve::{PseudoInverse, Ridge};
-use elm::{Accumulator, Activation, Biases, Elm, ElmParams, Neurons, Scalar};
-use ndarray::{Array1, Array2};
+use elm::{Accumulator, Activation, Biases, Elm, ElmParams, NeuronGroup, Scalar};
+use ndarray::{Array2, Axis};
 
 use super::{Reader, Seed, read};
 
@@ -105,16 +105,12 @@ fn use_accumulator<A: Scalar>(accumulator: &Accumulator<A>) {
     }
 }
 
-fn data<A: Scalar>() -> (Array2<A>, Array1<A>) {
+fn data<A: Scalar>() -> (Array2<A>, Array2<A>) {
     let x = Array2::from_shape_fn((8, 2), |(i, j)| {
         A::from_f64(((i * (j + 2)) as f64 * 0.7).sin())
     });
-    let t = x
-        .rows()
-        .into_iter()
-        .map(|row| row[0] * row[1] + row[0])
-        .collect();
-    (x, t)
+    let t = x.map_axis(Axis(1), |row| row[0] * row[1] + row[0]);
+    (x, t.insert_axis(Axis(1)))
 }
 
 fn seed<T: Persist>(name: &'static str, json: bool, value: &T) -> Seed {
@@ -135,16 +131,16 @@ fn models() -> Vec<Seed> {
     }
     let plain = fit(&ElmParams::<f64>::new(3));
     let linked = ElmParams::<f64>::new(2)
-        .solver(PseudoInverse::default())
-        .activation(Activation::Sine)
-        .biases(Biases::OnData)
-        .direct_links(true)
-        .standardise(false)
-        .intercept(false);
+        .with_solver(PseudoInverse::default())
+        .with_activation(Activation::Sine)
+        .with_biases(Biases::AtTrainingRows)
+        .with_direct_links(true)
+        .with_standardize(false)
+        .with_intercept(false);
     let mixed = ElmParams::<f64>::new(1)
-        .and(Neurons::new(1, Activation::Sine))
-        .and(Neurons::radial(2));
-    let single = fit(&ElmParams::<f32>::new(2).solver(Ridge::relative(1e-3)));
+        .with_group(NeuronGroup::new(1, Activation::Sine))
+        .with_group(NeuronGroup::rbf(2));
+    let single = fit(&ElmParams::<f32>::new(2).with_solver(Ridge::relative(1e-3)));
     let mut broken = persist::to_bytes(&plain).expect("a built-in activation");
     broken.truncate(broken.len() / 2);
     vec![
@@ -163,32 +159,31 @@ fn models() -> Vec<Seed> {
 }
 
 fn accumulators() -> Vec<Seed> {
-    fn filled<A: Scalar>(params: ElmParams<A>, times: usize) -> Accumulator<A> {
+    fn filled<A: Scalar>(params: &ElmParams<A>, times: usize) -> Accumulator<A> {
         let (x, t) = data();
-        let params = params.check().expect("parameters in range");
         let mut accumulator =
-            Accumulator::from_sample(&params, &x, 1).expect("rows without a fault");
+            Accumulator::from_sample(params, &x, 1).expect("rows without a fault");
         for _ in 0..times {
             accumulator.push(&x, &t).expect("rows without a fault");
         }
         accumulator
     }
-    let ridge = filled(ElmParams::<f64>::new(2).solver(Ridge::gcv()), 3);
+    let ridge = filled(&ElmParams::<f64>::new(2).with_solver(Ridge::gcv()), 3);
     vec![
-        seed("empty.elm", false, &filled(ElmParams::<f64>::new(1), 0)),
+        seed("empty.elm", false, &filled(&ElmParams::<f64>::new(1), 0)),
         seed("ridge.json", true, &ridge),
         seed("ridge.elm", false, &ridge),
         seed(
             "linked.elm",
             false,
             &filled(
-                ElmParams::<f64>::new(1)
-                    .solver(PseudoInverse::default())
-                    .direct_links(true)
-                    .intercept(false),
+                &ElmParams::<f64>::new(1)
+                    .with_solver(PseudoInverse::default())
+                    .with_direct_links(true)
+                    .with_intercept(false),
                 2,
             ),
         ),
-        seed("single.json", true, &filled(ElmParams::<f32>::new(1), 4)),
+        seed("single.json", true, &filled(&ElmParams::<f32>::new(1), 4)),
     ]
 }

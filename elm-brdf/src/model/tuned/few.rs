@@ -196,13 +196,13 @@ impl<'a> Search<'a> {
 
     fn params(&self, set: &Set, candidate: usize, neurons: usize) -> ElmParams<f64> {
         ElmParams::new(neurons)
-            .activation(Activation::Sine)
-            .distribution(Distribution::StudentT(FREEDOM))
-            .biases(Biases::Scaled(PI))
-            .input_scales(set.scales.row(candidate).to_vec())
-            .bounded(false)
+            .with_activation(Activation::Sine)
+            .with_distribution(Distribution::StudentT(FREEDOM))
+            .with_biases(Biases::Scaled(PI))
+            .with_input_scales(set.scales.row(candidate).to_vec())
+            .with_bounded(false)
             // Candidates draw for themselves, so that those averaged err differently.
-            .seed(self.tuned.seed.wrapping_add(1000 * (candidate as u64 + 1)))
+            .with_seed(self.tuned.seed.wrapping_add(1000 * (candidate as u64 + 1)))
     }
 
     /// The hidden-layer matrix of a candidate at the rows of the search.

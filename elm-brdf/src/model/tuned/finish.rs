@@ -7,7 +7,9 @@
 //! network returns more light than it receives, and than its measurements do by their nearest
 //! neighbours, they count for more.
 
-use elm::{Elm, FeatureMap, HiddenLayer, Scaler};
+use elm::advanced::{FeatureMap, HiddenLayer};
+
+use elm::{Elm, Scaler};
 use ndarray::{Array1, Array2, Axis, Slice};
 
 use super::Drawn;

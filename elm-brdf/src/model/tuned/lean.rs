@@ -2,13 +2,13 @@
 
 use elm::prune::Keep;
 use elm::solve::Ridge;
-use elm::{Activation, Biases, CheckedParams, Distribution, ElmParams, Scaler};
+use elm::{Activation, Biases, Distribution, ElmParams, Scaler};
 use ndarray::{Array2, ArrayView2, Axis};
 use rand::seq::index;
 
 use super::errors::row_weights;
 use super::many::RIDGE;
-use super::{Drawn, provenance};
+use super::{Drawn, dataset, provenance};
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::fit::{Fit, check};
@@ -160,9 +160,8 @@ impl Lean {
             drawn, held_out, ..
         } = best;
         let weights = row_weights(self.metric, pairs, values, &link);
-        let weights = weights.as_ref().map(|weights| weights.view());
-        let params = search.solve()?;
-        let network = params.fit_map(drawn.map, &x, &targets, weights)?;
+        let data = dataset(&x, &targets, weights.as_ref())?;
+        let network = search.solve().fit_map(drawn.map, &data)?;
         let mut about = provenance(self.seed, self.metric, pairs, values);
         about.held_out = Some(held_out);
         let layer = Layer::Drawn(vec![drawn.draw]);
@@ -219,9 +218,9 @@ struct Judge {
 
 impl Search<'_> {
     /// How output weights are found. Directions are bounded by themselves.
-    fn solve(&self) -> Result<CheckedParams<f64>> {
-        let params = ElmParams::new(self.lean.neurons).bounded(false);
-        Ok(params.solver(self.ridge).check()?)
+    fn solve(&self) -> ElmParams<f64> {
+        let params = ElmParams::new(self.lean.neurons).with_bounded(false);
+        params.with_solver(self.ridge)
     }
 
     fn try_scales(&self, scales: Vec<f64>, bias: f64, judge: &Judge) -> Result<Found> {
@@ -232,22 +231,22 @@ impl Search<'_> {
             neurons
         };
         let params = ElmParams::new(count)
-            .activation(self.lean.activation.clone())
-            .distribution(Distribution::Normal)
-            .input_scales(scales.clone())
-            .biases(Biases::Scaled(bias))
-            .seed(self.lean.seed);
+            .with_activation(self.lean.activation.clone())
+            .with_distribution(Distribution::Normal)
+            .with_input_scales(scales.clone())
+            .with_biases(Biases::Scaled(bias))
+            .with_seed(self.lean.seed);
         let mut drawn = Drawn::new(&params, scales.len(), self.scaler)?;
-        let params = self.solve()?;
-        let weights = self.weights.as_ref().map(|weights| weights.view());
+        let params = self.solve();
+        let data = dataset(&self.x, &self.targets, self.weights.as_ref())?;
         if count > neurons {
             let keep = Keep::Neurons(neurons);
             let map = drawn.map.clone();
-            let pruned = params.prune_map(map, &self.x, &self.targets, keep, weights)?;
+            let pruned = params.prune_map(map, &data, keep)?;
             drawn = drawn.pruned(&pruned.kept)?;
         }
         let map = drawn.map.clone();
-        let network = params.fit_map(map, &self.x, &self.targets, weights)?;
+        let network = params.fit_map(map, &data)?;
         let predicted = self.link.to_values(network.predict(&judge.x)?)?;
         let held_out = Metrics::of(&judge.pairs, predicted.view(), judge.values.view())?;
         Ok(Found {

@@ -9,7 +9,7 @@ use rand::seq::index;
 use super::errors::{cut_off_means, dark_noise, geometric_root};
 use super::finish::Finished;
 use super::problem::Problem;
-use super::{Drawn, NOISY, TIE, Tuned, better, model_of};
+use super::{Drawn, NOISY, TIE, Tuned, better, dataset, model_of};
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::link::{FittedLink, Link};
@@ -102,14 +102,13 @@ fn finished(problem: &Problem<'_>, setting: &Setting, rows: &[usize]) -> Result<
     let few = &rows[..rows.len().min(PRUNE_ROWS.max(count))];
     let params = tuned.waves(count, &setting.scales);
     let layer = Drawn::new(&params, x.ncols(), &scaler)?;
-    let params = params.solver(Ridge::relative(RIDGE)).check()?;
+    let params = params.with_solver(Ridge::relative(RIDGE));
+    let (few_x, few_targets) = (x.select(Axis(0), few), problem.targets(few));
     let few_weights = problem.weights(few);
     let pruned = params.prune_map(
         layer.map.clone(),
-        &x.select(Axis(0), few),
-        &problem.targets(few),
+        &dataset(&few_x, &few_targets, few_weights.as_ref())?,
         Keep::Neurons(neurons),
-        few_weights.as_ref().map(|weights| weights.view()),
     )?;
     let layer = layer.pruned(&pruned.kept)?;
     problem.finish(setting.set, &scaler, &[layer], &x)
@@ -249,8 +248,9 @@ impl<'a> Search<'a> {
     fn try_scales(&self, inputs: &Inputs, scales: Vec<f64>) -> Result<Setting> {
         let params = self.tuned.waves(SEARCH_NEURONS, &scales);
         let map = Drawn::new(&params, scales.len(), &inputs.scaler)?.map;
-        let params = params.solver(Ridge::relative(RIDGE)).check()?;
-        let network = params.fit_map(map, &inputs.fitted, &self.fitted.targets, None)?;
+        let params = params.with_solver(Ridge::relative(RIDGE));
+        let data = dataset(&inputs.fitted, &self.fitted.targets, None)?;
+        let network = params.fit_map(map, &data)?;
         let targets = network.predict(&inputs.judged)?;
         let predicted = self.link.to_values(targets.clone())?;
         Ok(Setting {

@@ -167,7 +167,7 @@ impl Factor {
 
     /// The logarithm of each output's evidence up to a constant of the rows and outputs, by the
     /// formula of
-    /// [`log_evidence`](elm::validate::Validator::log_evidence).
+    /// [`log_evidence`](elm::cross_validation::CrossValidator::log_evidence).
     pub(super) fn evidence(&self, moments: &Moments) -> Result<Vec<f64>> {
         let y = self.triangle.forward(&moments.cross)?;
         let neurons = y.nrows() - 1;
@@ -219,8 +219,8 @@ pub(super) fn rounding(beta: ArrayView2<'_, f64>, reach: ArrayView1<'_, f64>) ->
 mod tests {
     use super::*;
     use approx::assert_abs_diff_eq;
+    use elm::cross_validation::CrossValidator;
     use elm::solve::LeastSquares;
-    use elm::validate::Validator;
 
     fn problem(rows: usize, neurons: usize) -> (Array2<f64>, Array2<f64>) {
         let h = Array2::from_shape_fn((rows, neurons), |(i, j)| {
@@ -239,7 +239,8 @@ mod tests {
             let (h, t) = problem(rows, neurons);
             let moments = Moments::of(h.view(), t.view(), None);
             let validator =
-                Validator::new(&LeastSquares::new(&h, &t).unwrap().intercept(true)).unwrap();
+                CrossValidator::new(&LeastSquares::new(&h, &t).unwrap().with_intercept(true))
+                    .unwrap();
             let mut differences = Vec::new();
             for relative in [1e-6, 1e-3] {
                 let solution = validator.solve(&[relative]).unwrap();

@@ -1,6 +1,6 @@
 //! A layer at the rows and at the anchors of a problem, as sums of products.
 
-use elm::FeatureMap;
+use elm::advanced::FeatureMap;
 use ndarray::{Array1, Array2, ArrayView2, Axis, Slice};
 
 use super::errors::no_fit;

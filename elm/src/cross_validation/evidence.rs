@@ -1,15 +1,15 @@
-//! The evidence (marginal likelihood) of a hidden layer, from the factorisation of the fit.
+//! The evidence (marginal likelihood) of a hidden layer, from the factorization of the fit.
 
 use std::f64::consts::TAU;
 
 use ndarray::Zip;
 
-use super::Validator;
+use super::CrossValidator;
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 use crate::solve::design_svd::DesignSvdWithRows;
 
-impl<A: Scalar> Validator<A> {
+impl<A: Scalar> CrossValidator<A> {
     /// The logarithm of each output's evidence, also called marginal likelihood: the density of its
     /// targets where output weights are normal with a variance of $\sigma^2 / \lambda$ (what ridge
     /// takes them to be), with the $\sigma$ that makes it largest, an intercept integrated out:

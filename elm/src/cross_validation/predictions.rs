@@ -1,67 +1,84 @@
 //! Held-out predictions, and their errors along a path of strengths.
 
-use ndarray::{Array1, Array2, ArrayView2, Axis};
+use std::marker::PhantomData;
 
+use ndarray::{Array1, Array2, ArrayView, ArrayView2, Axis, Ix2};
+
+use crate::dataset::{TargetDim, per_output};
 use crate::scalar::Scalar;
 use crate::solve::Ridge;
 
-/// Predictions for rows by fits that have not seen them; made by [`Validator`](super::Validator) and by
-/// [`CheckedParams::cross_validate`](crate::CheckedParams::cross_validate).
+/// Predictions for rows by fits that have not seen them; made by
+/// [`ElmParams::cross_val_predict`](crate::ElmParams::cross_val_predict) and by
+/// [`CrossValidator`](super::CrossValidator). They have the dimension of the targets.
 ///
 /// ```
-/// use elm::{ElmParams, validate::assign_folds};
+/// use elm::{Dataset, ElmParams};
 /// use ndarray::{Array1, Axis};
 ///
 /// let x = Array1::linspace(-3.0, 3.0, 60).insert_axis(Axis(1));
 /// let t = x.mapv(f64::sin);
-/// let params = ElmParams::new(20).check()?;
-/// let held_out = params.cross_validate(&x, &t, &assign_folds(60, 6, 1)?)?;
+/// let data = Dataset::new(&x, &t)?;
+/// let held_out = ElmParams::new(20).cross_val_predict(&data, &data.folds(6, 1)?)?;
 /// assert!((&held_out.predictions() + &held_out.residuals() - &t).iter().all(|d| d.abs() < 1e-12));
 /// # Ok::<(), elm::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct HeldOut<A: Scalar> {
+pub struct CvPredictions<A: Scalar, D: TargetDim = Ix2> {
     pub(super) predictions: Array2<A>,
     pub(super) residuals: Array2<A>,
     /// Relative to the largest.
     pub(super) weights: Array1<A>,
+    pub(super) dimension: PhantomData<D>,
 }
 
-impl<A: Scalar> HeldOut<A> {
-    /// The prediction for each row and output, shape (rows, outputs).
+impl<A: Scalar> CvPredictions<A> {
+    /// The same, as arrays of the dimension of the targets.
+    pub(crate) fn of_dimension<D: TargetDim>(self) -> CvPredictions<A, D> {
+        CvPredictions {
+            predictions: self.predictions,
+            residuals: self.residuals,
+            weights: self.weights,
+            dimension: PhantomData,
+        }
+    }
+}
+
+impl<A: Scalar, D: TargetDim> CvPredictions<A, D> {
+    /// The prediction for each row and output, shape (rows, outputs) or (rows).
     #[must_use]
-    pub fn predictions(&self) -> ArrayView2<'_, A> {
-        self.predictions.view()
+    pub fn predictions(&self) -> ArrayView<'_, A, D> {
+        D::of_matrix_view(self.predictions.view())
     }
 
-    /// Target less prediction, shape (rows, outputs); not subtracted from the predictions, so that
+    /// Target less prediction, shape (rows, outputs) or (rows); not subtracted from the predictions, so that
     /// small ones have all their digits.
     #[must_use]
-    pub fn residuals(&self) -> ArrayView2<'_, A> {
-        self.residuals.view()
+    pub fn residuals(&self) -> ArrayView<'_, A, D> {
+        D::of_matrix_view(self.residuals.view())
     }
 
     /// Root mean squared residual of each output over all rows, with the weights of the fit.
     #[must_use]
-    pub fn rmse(&self) -> Vec<f64> {
-        self.residuals
-            .columns()
-            .into_iter()
-            .map(|column| crate::metrics::root_mean_square(column, self.weights.view()))
-            .collect()
+    pub fn rmse(&self) -> D::PerOutput<f64> {
+        per_output::<D, _>(self.residuals.ncols(), |output| self.rmse_of(output))
+    }
+
+    pub(super) fn rmse_of(&self, output: usize) -> f64 {
+        crate::metrics::root_mean_square(self.residuals.column(output), self.weights.view())
     }
 }
 
-/// Held-out errors along a path of strengths; made by [`Validator`](super::Validator).
+/// Held-out errors along a path of strengths; made by [`CrossValidator`](super::CrossValidator).
 ///
 /// ```
 /// use elm::solve::{LeastSquares, Ridge};
-/// use elm::validate::Validator;
+/// use elm::cross_validation::CrossValidator;
 /// use ndarray::{Array2, array};
 ///
 /// let h = Array2::from_shape_fn((12, 3), |(i, j)| (i as f64 * 0.7 + j as f64).sin());
 /// let t = h.dot(&array![[1.0], [-2.0], [0.5]]);
-/// let validator = Validator::new(&LeastSquares::new(&h, &t)?)?;
+/// let validator = CrossValidator::new(&LeastSquares::new(&h, &t)?)?;
 /// let path = validator.leave_one_out_path(&[1.0, 1e-3, 1e-6])?;
 /// // Without noise the weakest is the best.
 /// assert_eq!(path.best(), [1e-6]);
@@ -69,17 +86,17 @@ impl<A: Scalar> HeldOut<A> {
 /// # Ok::<(), elm::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct Path {
+pub struct LambdaPath {
     pub(super) lambdas: Vec<f64>,
     pub(super) rmse: Array2<f64>,
-    /// For each output the size of its (centred) targets.
+    /// For each output the size of its (centered) targets.
     pub(super) scale: Array1<f64>,
 }
 
 /// Scores that differ by rounding alone.
 const EQUAL: f64 = 1e-9;
 
-impl Path {
+impl LambdaPath {
     /// The relative strengths, as they were asked for.
     #[must_use]
     pub fn lambdas(&self) -> &[f64] {

@@ -1,16 +1,16 @@
 //! Validation in closed form: what a fit would predict for rows that it has not seen, for any
-//! division into folds, from the one factorisation of the full fit. No row is ever refitted.
+//! division into folds, from the one factorization of the full fit. No row is ever refitted.
 //!
 //! ```
 //! use elm::solve::{LeastSquares, Ridge};
-//! use elm::validate::{Validator, assign_folds};
+//! use elm::cross_validation::{CrossValidator, assign_folds};
 //! use ndarray::{Array2, array};
 //!
 //! let h = Array2::from_shape_fn((12, 3), |(i, j)| (i as f64 * 0.7 + j as f64).sin());
 //! let t = h.dot(&array![[1.0], [-2.0], [0.5]]) + 3.0;
-//! let validator = Validator::new(&LeastSquares::new(&h, &t)?.intercept(true))?;
+//! let validator = CrossValidator::new(&LeastSquares::new(&h, &t)?.with_intercept(true))?;
 //! let folds = assign_folds(12, 4, 0)?;
-//! let path = validator.k_fold_path(&folds, &Ridge::candidates())?;
+//! let path = validator.k_fold_path(&folds, &Ridge::lambda_grid())?;
 //! let held_out = validator.k_fold(&folds, &path.best())?;
 //! assert!(held_out.rmse()[0] < 1e-6);
 //! # Ok::<(), elm::Error>(())
@@ -30,34 +30,34 @@
 //!
 //! # What is and is not seen
 //! Ridge's $\lambda$ is relative to the largest singular value of **all** rows; every fold is
-//! fitted with that same absolute $\lambda$. When inputs were standardised on all rows, the mean
+//! fitted with that same absolute $\lambda$. When inputs were standardized on all rows, the mean
 //! and deviation of a held-out row's inputs have entered the hidden layer (its targets never do);
 //! so has a row's input in whatever else was derived from all inputs. That leak is of the order of
 //! one row's share in a mean, and it shrinks with the number of rows; protocols that forbid it
-//! standardise on the training rows of each fold and refit. Choosing $\lambda$ by a held-out score
+//! standardize on the training rows of each fold and refit. Choosing $\lambda$ by a held-out score
 //! and then quoting that score as the error is the usual mild optimism of model selection.
 
 mod evidence;
-mod fits;
 mod fold;
-mod held_out;
+mod fold_predictions;
+mod predictions;
+
+use std::marker::PhantomData;
 
 use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, Axis, Zip};
-use rand::seq::SliceRandom;
 
 use crate::check::check_length;
+pub use crate::dataset::assign_folds;
 use crate::error::{Error, Result};
-use crate::memory::check_room;
 use crate::scalar::Scalar;
 use crate::solve::design_svd::{DesignSvd, DesignSvdWithRows};
-use crate::solve::ridge::answer;
+use crate::solve::ridge::ridge_solution;
 use crate::solve::{LeastSquares, Reason, Ridge, Solution, in_range};
-use crate::stream::Stream;
-pub use fits::FoldFit;
 use fold::Fold;
-pub use held_out::{HeldOut, Path};
+pub use fold_predictions::FoldPredictions;
+pub use predictions::{CvPredictions, LambdaPath};
 
-/// A least-squares problem, factorised once, ready to answer what it would predict without some
+/// A least-squares problem, factorized once, ready to answer what it would predict without some
 /// of its rows.
 ///
 /// Strengths are given as one relative $\lambda$ for all outputs or one for each; 0 stands for
@@ -69,35 +69,35 @@ pub use held_out::{HeldOut, Path};
 ///
 /// ```
 /// use elm::solve::{LeastSquares, Ridge};
-/// use elm::validate::Validator;
+/// use elm::cross_validation::CrossValidator;
 /// use ndarray::{Array2, array};
 ///
 /// let h = Array2::from_shape_fn((12, 3), |(i, j)| (i as f64 * 0.7 + j as f64).sin());
 /// let t = h.dot(&array![[1.0], [-2.0], [0.5]]);
-/// let validator = Validator::new(&LeastSquares::new(&h, &t)?)?;
-/// let lambda = validator.strengths(Ridge::default())?;
+/// let validator = CrossValidator::new(&LeastSquares::new(&h, &t)?)?;
+/// let lambda = validator.select_lambda(Ridge::default())?;
 /// // What each row is predicted to be by the fit to the eleven others.
 /// let held_out = validator.leave_one_out(&lambda)?;
 /// assert!(held_out.rmse()[0] < 1e-6);
 /// # Ok::<(), elm::Error>(())
 /// ```
 #[derive(Debug, Clone)]
-pub struct Validator<A: Scalar> {
+pub struct CrossValidator<A: Scalar> {
     rows: DesignSvdWithRows<A>,
     /// As given, shape (rows, outputs).
     targets: Array2<A>,
-    /// Weighted, centred and scaled, as the factorisation saw them.
+    /// Weighted, centered and scaled, as the factorization saw them.
     inner_targets: Array2<A>,
     /// The rows of weight 0, and their coordinates in the singular vectors, one row each.
     absent: Vec<usize>,
     absent_coordinates: Array2<A>,
 }
 
-impl<A: Scalar> Validator<A> {
-    /// Factorises the problem: one singular value decomposition.
+impl<A: Scalar> CrossValidator<A> {
+    /// Factorizes the problem: one singular value decomposition.
     ///
     /// # Errors
-    /// [`Error::NoConvergence`] from the factorisation.
+    /// [`Error::NoConvergence`] from the factorization.
     pub fn new(problem: &LeastSquares<'_, A>) -> Result<Self> {
         let rows = DesignSvdWithRows::new(problem)?;
         let spectrum = &rows.spectrum;
@@ -106,10 +106,10 @@ impl<A: Scalar> Validator<A> {
         let absent: Vec<usize> = (0..frame.rows)
             .filter(|&row| frame.root_weights[row] == A::zero())
             .collect();
-        // Scaled before centring, as the difference of two huge values may overflow.
+        // Scaled before centering, as the difference of two huge values may overflow.
         let hidden = problem.hidden().select(Axis(0), &absent) / frame.hidden_scale;
-        let centred = hidden - frame.hidden_mean.mapv(|m| m / frame.hidden_scale);
-        let absent_coordinates = A::product(centred.view(), spectrum.vt.t()) / &spectrum.s;
+        let centered = hidden - frame.hidden_mean.mapv(|m| m / frame.hidden_scale);
+        let absent_coordinates = A::product(centered.view(), spectrum.vt.t()) / &spectrum.s;
         Ok(Self {
             targets: problem.targets().to_owned(),
             inner_targets,
@@ -132,16 +132,16 @@ impl<A: Scalar> Validator<A> {
     }
 
     /// The relative strengths that `ridge` takes for this problem, one per output: given ones, or
-    /// chosen from the same factorisation.
+    /// chosen from the same factorization.
     ///
     /// # Errors
     /// [`Error::Parameter`] when its settings are out of range.
-    pub fn strengths(&self, ridge: Ridge) -> Result<Vec<f64>> {
+    pub fn select_lambda(&self, ridge: Ridge) -> Result<Vec<f64>> {
         ridge.check()?;
-        Ok(ridge.strengths(&self.rows))
+        Ok(ridge.select_lambda(&self.rows))
     }
 
-    /// The fit to all rows at these strengths, from the same factorisation.
+    /// The fit to all rows at these strengths, from the same factorization.
     ///
     /// # Errors
     /// [`Error::Shape`] when `lambda` has neither one entry nor one per output,
@@ -154,24 +154,24 @@ impl<A: Scalar> Validator<A> {
                 strengths[output] = strength.as_f64();
             }
         }
-        in_range(answer(
+        in_range(ridge_solution(
             &self.rows.spectrum,
-            Reason::StrengthSearch,
+            Reason::LambdaSearch,
             &strengths,
             None,
         ))
     }
 
-    /// Coordinates of new hidden rows: centred, scaled, along the right singular vectors (shape
+    /// Coordinates of new hidden rows: centered, scaled, along the right singular vectors (shape
     /// (rows, $k$)), and the squared length that lies outside them.
     fn coordinates(&self, hidden: &ArrayRef2<A>) -> (Array2<A>, Array1<A>) {
         let DesignSvd { frame, vt, .. } = &self.rows.spectrum;
-        // Scaled before centring, as the difference of two huge values may overflow.
+        // Scaled before centering, as the difference of two huge values may overflow.
         let scaled = hidden / frame.hidden_scale;
-        let centred = scaled - frame.hidden_mean.mapv(|m| m / frame.hidden_scale);
-        let inside = A::product(centred.view(), vt.t());
+        let centered = scaled - frame.hidden_mean.mapv(|m| m / frame.hidden_scale);
+        let inside = A::product(centered.view(), vt.t());
         let length = |row: ArrayView1<'_, A>| row.dot(&row);
-        let outside = Zip::from(centred.rows())
+        let outside = Zip::from(centered.rows())
             .and(inside.rows())
             .map_collect(|all, inside| (length(all) - length(inside)).max(A::zero()));
         (inside, outside)
@@ -232,12 +232,12 @@ impl<A: Scalar> Validator<A> {
     /// [`Error::Shape`] when `lambda` has neither one entry nor one per output,
     /// [`Error::Parameter`] when one is negative or not finite, [`Error::Undetermined`] naming the
     /// first row without which the others have no unique answer to it.
-    pub fn leave_one_out(&self, lambda: &[f64]) -> Result<HeldOut<A>> {
+    pub fn leave_one_out(&self, lambda: &[f64]) -> Result<CvPredictions<A>> {
         let spectrum = &self.rows.spectrum;
         let squared = self.rows.u.mapv(|u| u * u);
         self.held_out(lambda, |strength, outputs, inner| {
             let complements = spectrum.filter_complements(strength);
-            let denominators = squared.dot(&complements) + &self.rows.free;
+            let denominators = squared.dot(&complements) + &self.rows.one_minus_leverage;
             let least = self.singular_level(strength).powi(2);
             let lone = !spectrum.can_lose_a_row();
             for (row, &denominator) in denominators.iter().enumerate() {
@@ -267,12 +267,12 @@ impl<A: Scalar> Validator<A> {
     /// # Errors
     /// As [`leave_one_out`](Self::leave_one_out); [`Error::Shape`] also when there is not one
     /// label per row. [`Error::Undetermined`] names the label.
-    pub fn k_fold(&self, folds: &[usize], lambda: &[f64]) -> Result<HeldOut<A>> {
+    pub fn k_fold(&self, folds: &[usize], lambda: &[f64]) -> Result<CvPredictions<A>> {
         let folds = Fold::divide(self, folds)?;
         self.k_fold_divided(&folds, lambda)
     }
 
-    fn k_fold_divided(&self, folds: &[Fold<A>], lambda: &[f64]) -> Result<HeldOut<A>> {
+    fn k_fold_divided(&self, folds: &[Fold<A>], lambda: &[f64]) -> Result<CvPredictions<A>> {
         self.held_out(lambda, |strength, outputs, inner| {
             let mut absent = Vec::new();
             for fold in folds {
@@ -293,7 +293,7 @@ impl<A: Scalar> Validator<A> {
     ///
     /// # Errors
     /// Those of [`k_fold`](Self::k_fold).
-    pub fn k_fold_path(&self, folds: &[usize], lambdas: &[f64]) -> Result<Path> {
+    pub fn k_fold_path(&self, folds: &[usize], lambdas: &[f64]) -> Result<LambdaPath> {
         let folds = Fold::divide(self, folds)?;
         self.path(lambdas, |lambda| self.k_fold_divided(&folds, &[lambda]))
     }
@@ -302,11 +302,15 @@ impl<A: Scalar> Validator<A> {
     ///
     /// # Errors
     /// Those of [`leave_one_out`](Self::leave_one_out).
-    pub fn leave_one_out_path(&self, lambdas: &[f64]) -> Result<Path> {
+    pub fn leave_one_out_path(&self, lambdas: &[f64]) -> Result<LambdaPath> {
         self.path(lambdas, |lambda| self.leave_one_out(&[lambda]))
     }
 
-    fn path(&self, lambdas: &[f64], at: impl Fn(f64) -> Result<HeldOut<A>>) -> Result<Path> {
+    fn path(
+        &self,
+        lambdas: &[f64],
+        at: impl Fn(f64) -> Result<CvPredictions<A>>,
+    ) -> Result<LambdaPath> {
         if lambdas.is_empty() {
             return Err(Error::Empty {
                 what: "path of strengths",
@@ -316,7 +320,7 @@ impl<A: Scalar> Validator<A> {
         }
         let mut rmse = Array2::zeros((lambdas.len(), self.outputs()));
         for (mut row, &lambda) in rmse.rows_mut().into_iter().zip(lambdas) {
-            row.assign(&Array1::from(at(lambda)?.rmse()));
+            row.assign(&at(lambda)?.rmse());
         }
         // Relative to what the fit has to explain, so that outputs of any unit can be averaged.
         let spectrum = &self.rows.spectrum;
@@ -328,7 +332,7 @@ impl<A: Scalar> Validator<A> {
                     size => size,
                 },
             );
-        Ok(Path {
+        Ok(LambdaPath {
             lambdas: lambdas.to_vec(),
             rmse,
             scale,
@@ -342,7 +346,7 @@ impl<A: Scalar> Validator<A> {
         &self,
         lambda: &[f64],
         mut fit: impl FnMut(A, &[usize], &mut Array2<A>) -> Result<Vec<(Vec<usize>, Array2<A>)>>,
-    ) -> Result<HeldOut<A>> {
+    ) -> Result<CvPredictions<A>> {
         let frame = &self.rows.spectrum.frame;
         let mut residuals = Array2::zeros(self.targets.dim());
         for (strength, outputs) in self.by_strength(lambda)? {
@@ -370,10 +374,11 @@ impl<A: Scalar> Validator<A> {
                 what: "a held-out prediction",
             });
         }
-        Ok(HeldOut {
+        Ok(CvPredictions {
             predictions,
             residuals,
             weights: frame.root_weights.mapv(|root| root * root),
+            dimension: PhantomData,
         })
     }
 
@@ -447,23 +452,4 @@ impl<A: Scalar> Validator<A> {
         }
         residuals
     }
-}
-
-/// Assigns each row to one of `folds` folds at random, sizes differing by at most 1; one seed
-/// gives one assignment on every platform.
-///
-/// # Errors
-/// [`Error::Parameter`] unless $2 \le$ `folds` $\le$ `rows`; [`Error::TooLarge`].
-pub fn assign_folds(rows: usize, folds: usize, seed: u64) -> Result<Vec<usize>> {
-    if folds < 2 || folds > rows {
-        return Err(Error::Parameter {
-            name: "folds",
-            value: folds as f64,
-            expected: "at least 2 and at most the number of rows",
-        });
-    }
-    check_room("the fold labels", rows, 1)?;
-    let mut labels: Vec<usize> = (0..rows).map(|row| row % folds).collect();
-    labels.shuffle(&mut Stream::Folds.of(seed));
-    Ok(labels)
 }

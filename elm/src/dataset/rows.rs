@@ -2,7 +2,8 @@
 
 use ndarray::{ArrayView1, ArrayView2, Axis, CowArray, Ix1, Ix2};
 
-use crate::check::{check_length, check_matrix, check_some_weight, present};
+use super::{Dataset, TargetDim};
+use crate::check::{check_some, check_some_weight, present};
 use crate::error::Result;
 use crate::scalar::Scalar;
 
@@ -18,17 +19,12 @@ impl<'a, A: Scalar> Rows<'a, A> {
     /// Copies rows only where some have weight 0.
     ///
     /// # Errors
-    /// [`Error`](crate::Error) for data that are empty, not finite or of different lengths, and for
-    /// weights that are negative, not finite or all 0.
-    pub(crate) fn new(
-        x: ArrayView2<'a, A>,
-        t: ArrayView2<'a, A>,
-        weights: Option<ArrayView1<'a, A>>,
-    ) -> Result<Self> {
-        check_matrix("inputs", x)?;
-        check_matrix("targets", t)?;
-        check_length("rows of targets", t.nrows(), x.nrows())?;
-        let Some(weights) = weights else {
+    /// [`Error`](crate::Error) for data without rows or columns, and for weights that are all 0.
+    pub(crate) fn new<D: TargetDim>(data: &'a Dataset<'_, A, D>) -> Result<Self> {
+        let (x, t) = (data.inputs(), data.target_matrix());
+        check_some("inputs", x)?;
+        check_some("targets", t)?;
+        let Some(weights) = data.weights() else {
             let (x, t) = (x.into(), t.into());
             let weights = None;
             return Ok(Self { x, t, weights });

@@ -1,59 +1,80 @@
-//! Every fold's complete fit, from the one factorisation.
+//! Every fold's complete fit, from the one factorization.
 
-use ndarray::{Array2, ArrayView2, Axis};
+use std::marker::PhantomData;
 
-use super::{Fold, Validator};
+use ndarray::{Array2, ArrayView, Axis, Ix2};
+
+use super::{CrossValidator, Fold};
+use crate::dataset::TargetDim;
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 
-/// What the fit without one fold predicts; made by [`Validator::k_fold_fits`] and by
-/// [`CheckedParams::cross_fits`](crate::CheckedParams::cross_fits).
+/// What the fit without one fold predicts; made by
+/// [`ElmParams::fold_predictions`](crate::ElmParams::fold_predictions) and by
+/// [`CrossValidator::fold_predictions`].
 ///
 /// ```
-/// use elm::{ElmParams, metrics::rmse, solve::Ridge, validate::assign_folds};
+/// use elm::{Dataset, ElmParams, metrics::rmse, solve::Ridge};
 /// use ndarray::{Array1, Axis};
 ///
 /// let x = Array1::linspace(-3.0, 3.0, 60).insert_axis(Axis(1));
-/// let t = x.mapv(f64::sin);
-/// let folds = assign_folds(60, 6, 1)?;
-/// let params = ElmParams::new(20).solver(Ridge::relative(1e-8)).check()?;
-/// for fit in params.cross_fits(&x, &t, &folds)? {
+/// let t = x.column(0).mapv(f64::sin);
+/// let data = Dataset::new(&x, &t)?;
+/// let folds = data.folds(6, 1)?;
+/// let params = ElmParams::new(20).with_solver(Ridge::relative(1e-8));
+/// for fit in params.fold_predictions(&data, &folds)? {
 ///     let trained: Vec<usize> = (0..60).filter(|&row| folds[row] != fit.label()).collect();
-///     let p = fit.predictions().column(0).select(Axis(0), &trained);
-///     assert!(rmse(&p, &t.column(0).select(Axis(0), &trained))? < 1e-2);
+///     let p = fit.predictions().select(Axis(0), &trained);
+///     assert!(rmse(&p, &t.select(Axis(0), &trained))? < 1e-2);
 /// }
 /// # Ok::<(), elm::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct FoldFit<A: Scalar> {
+pub struct FoldPredictions<A: Scalar, D: TargetDim = Ix2> {
     label: usize,
     predictions: Array2<A>,
+    dimension: PhantomData<D>,
 }
 
-impl<A: Scalar> FoldFit<A> {
+impl<A: Scalar> FoldPredictions<A> {
+    /// The same, as arrays of the dimension of the targets.
+    pub(crate) fn of_dimension<D: TargetDim>(self) -> FoldPredictions<A, D> {
+        FoldPredictions {
+            label: self.label,
+            predictions: self.predictions,
+            dimension: PhantomData,
+        }
+    }
+}
+
+impl<A: Scalar, D: TargetDim> FoldPredictions<A, D> {
     /// The label of the fold that was left out.
     #[must_use]
     pub fn label(&self) -> usize {
         self.label
     }
 
-    /// The prediction for every row, in the fold or not, shape (rows, outputs).
+    /// The prediction for every row, in the fold or not, shape (rows, outputs) or (rows).
     #[must_use]
-    pub fn predictions(&self) -> ArrayView2<'_, A> {
-        self.predictions.view()
+    pub fn predictions(&self) -> ArrayView<'_, A, D> {
+        D::of_matrix_view(self.predictions.view())
     }
 }
 
-impl<A: Scalar> Validator<A> {
+impl<A: Scalar> CrossValidator<A> {
     /// As [`k_fold`](Self::k_fold), with what each fold's fit predicts for the rows that it was
     /// fitted to as well: one entry per fold, in rising order of its label.
     ///
     /// Leaving rows out is fitting the targets less their held-out residuals (see the
-    /// [module](crate::validate)), so the fit without a fold costs one product with $U$.
+    /// [module](crate::cross_validation)), so the fit without a fold costs one product with $U$.
     ///
     /// # Errors
     /// Those of [`k_fold`](Self::k_fold).
-    pub fn k_fold_fits(&self, folds: &[usize], lambda: &[f64]) -> Result<Vec<FoldFit<A>>> {
+    pub fn fold_predictions(
+        &self,
+        folds: &[usize],
+        lambda: &[f64],
+    ) -> Result<Vec<FoldPredictions<A>>> {
         let strengths = self.by_strength(lambda)?;
         let coordinates = self.row_coordinates();
         let folds = Fold::divide(self, folds)?;
@@ -67,9 +88,10 @@ impl<A: Scalar> Validator<A> {
                     what: "a held-out prediction",
                 });
             }
-            Ok(FoldFit {
+            Ok(FoldPredictions {
                 label: fold.label,
                 predictions,
+                dimension: PhantomData,
             })
         };
         folds.iter().map(fit).collect()
@@ -115,7 +137,7 @@ impl<A: Scalar> Validator<A> {
     }
 
     /// What the fit without `rows`, which have the inner held-out residuals `inner`, gives at
-    /// `coordinates`: above the mean and in the scale of the factorisation, shape (coordinates,
+    /// `coordinates`: above the mean and in the scale of the factorization, shape (coordinates,
     /// `outputs`).
     pub(super) fn fitted_without(
         &self,

@@ -1,10 +1,10 @@
-//! The held-out residuals of one fold, in the coordinates of the factorisation.
+//! The held-out residuals of one fold, in the coordinates of the factorization.
 
 use std::collections::BTreeMap;
 
 use ndarray::{Array1, Array2, Axis, s};
 
-use super::Validator;
+use super::CrossValidator;
 use crate::check::check_length;
 use crate::error::{Error, Result};
 use crate::linalg::{CholeskySolve, QrFactor};
@@ -35,7 +35,7 @@ enum Form<A: Scalar> {
 
 impl<A: Scalar> Fold<A> {
     /// Groups rows by label and prepares each group.
-    pub(super) fn divide(validator: &Validator<A>, labels: &[usize]) -> Result<Vec<Self>> {
+    pub(super) fn divide(validator: &CrossValidator<A>, labels: &[usize]) -> Result<Vec<Self>> {
         check_length("fold labels", labels.len(), validator.rows())?;
         let spectrum = &validator.rows.spectrum;
         let frame = &spectrum.frame;
@@ -110,10 +110,10 @@ impl<A: Scalar> Fold<A> {
     }
 
     /// The held-out residuals of [`rows`](Self::rows), shape (rows, `outputs`), in the units of
-    /// the factorisation.
+    /// the factorization.
     pub(super) fn residuals(
         &self,
-        validator: &Validator<A>,
+        validator: &CrossValidator<A>,
         strength: A,
         outputs: &[usize],
     ) -> Result<Array2<A>> {
@@ -141,7 +141,7 @@ impl<A: Scalar> Fold<A> {
     /// $\big((I - qq^T - UU^T)_{FF} + U_F f U_F^T\big) e = r_F$.
     fn by_rows(
         &self,
-        validator: &Validator<A>,
+        validator: &CrossValidator<A>,
         gap: &Array2<A>,
         strength: A,
         outputs: &[usize],
@@ -190,7 +190,7 @@ impl<A: Scalar> Fold<A> {
     /// equations are $\sqrt{1-f}\, [q, U]^T [q, U] \sqrt{1-f} + \operatorname{diag}(f)$.
     fn by_directions(
         &self,
-        validator: &Validator<A>,
+        validator: &CrossValidator<A>,
         gram: &Array2<A>,
         product: &Array2<A>,
         strength: A,
@@ -236,13 +236,13 @@ impl<A: Scalar> Fold<A> {
     /// entries of the size `scale`.
     fn least_squares(
         &self,
-        validator: &Validator<A>,
+        validator: &CrossValidator<A>,
         strength: A,
         scale: A,
         matrix: &Array2<A>,
         right: &Array2<A>,
     ) -> Result<Array2<A>> {
-        let QrFactor { r, qtb, .. } = A::triangularise(matrix.view(), right.view())?;
+        let QrFactor { r, qtb, .. } = A::triangularize(matrix.view(), right.view())?;
         let singular = A::singular_values(r.view())?;
         let level = rounding::<A>(matrix.nrows(), matrix.ncols()) * scale;
         let level = level.max(validator.singular_level(strength));
@@ -255,7 +255,7 @@ impl<A: Scalar> Fold<A> {
     }
 }
 
-impl<A: Scalar> Validator<A> {
+impl<A: Scalar> CrossValidator<A> {
     fn spanned(&self) -> bool {
         let spectrum = &self.rows.spectrum;
         spectrum.frame.spanned_by(spectrum.s.len())
@@ -283,7 +283,7 @@ impl<A: Scalar> Validator<A> {
         let mut gap = A::product(basis.view(), basis.t()).mapv_into(|v| -v);
         for (place, &row) in rows.iter().enumerate() {
             gap[[place, place]] = if rows.len() == 1 {
-                self.rows.free[row]
+                self.rows.one_minus_leverage[row]
             } else {
                 gap[[place, place]] + A::one()
             };
