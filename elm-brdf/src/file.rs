@@ -33,6 +33,7 @@ pub(crate) fn folder(dir: &Path) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::File`].
+#[cfg(feature = "render")]
 pub(crate) fn load<T: persist::Persist>(path: &Path) -> Result<T> {
     Ok(persist::load(path)?)
 }

@@ -38,6 +38,7 @@ pub mod export;
 pub mod features;
 #[cfg(feature = "fetch")]
 pub mod fetch;
+#[cfg(any(feature = "render", feature = "report"))]
 mod file;
 pub mod fit;
 #[cfg(feature = "render")]

@@ -96,6 +96,7 @@ pub struct Metrics {
 
 impl Metrics {
     /// The measures of no predictions at all: no error, and nothing that would need one.
+    #[cfg(feature = "report")]
     pub(crate) const NONE: Self = Self {
         rmse: 0.0,
         mae: 0.0,
