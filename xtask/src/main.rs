@@ -35,7 +35,7 @@ enum Command {
     Ci,
     /// Lists the commands that write the tables of docs/reports/, or runs some of them.
     Tables(tables::Selection),
-    /// Packages for crates.io, each built from its package, in publishing order.
+    /// The packages as they would be published, in publishing order, each built from its package.
     Package(package::Packaging),
 }
 

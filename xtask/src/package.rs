@@ -1,4 +1,4 @@
-//! Packages for crates.io, in the order in which they can be published.
+//! Packages as they would be published, in the order in which they can be.
 
 use clap::Args;
 
