@@ -10,8 +10,8 @@
 //! - [`csv`] reads numeric tables; [`toy`] makes regression problems with known answers.
 //!
 //! Directions are unit vectors in the frame of the surface, which readers make of a file's angles
-//! and writers turn into [`Angles`]; values are BRDF in 1/sr without the cosine. Nothing here panics on bad input: every failure is an [`Error`] that names
-//! the file, the line and what was expected there.
+//! and writers turn into [`Angles`]; values are BRDF in 1/sr without the cosine. Nothing here panics on bad
+//! input: every failure is an [`Error`] that names the file, the line and what was expected there.
 //!
 //! ```
 //! use elm_datasets::{Invalid, curet, synthetic};

@@ -205,8 +205,8 @@ impl<A: Scalar, D: TargetDim> Elm<A, D> {
         }
     }
 
-    /// The same network with predictions of another dimension: [`Ix2`](type@Ix2) for a matrix, [`Ix1`](type@ndarray::Ix1) for one
-    /// value per row.
+    /// The same network with predictions of another dimension: [`Ix2`](type@Ix2) for a matrix,
+    /// [`Ix1`](type@ndarray::Ix1) for one value per row.
     ///
     /// ```
     /// use elm::ElmParams;

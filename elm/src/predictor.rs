@@ -64,7 +64,8 @@ pub struct Predictor<A: Scalar, D: TargetDim = Ix2> {
 
 impl<A: Scalar, D: TargetDim> Elm<A, D> {
     /// Predicts every output for every row: shape (rows, inputs) to (rows, outputs), or (rows) after a fit
-    /// to one value per row. Outside the training rows predictions are held to their [`bounds`](Self::bounds).
+    /// to one value per row. Outside the training rows predictions are held to their
+    /// [`bounds`](Self::bounds).
     ///
     /// # Errors
     /// [`Error::Shape`] when the number of inputs differs from the training data's,
@@ -80,7 +81,8 @@ impl<A: Scalar, D: TargetDim> Elm<A, D> {
     }
 
     /// The coefficient of determination $R^2$ of predictions for these rows, the mean over outputs: 1 for
-    /// exact ones, 0 for none better than the mean of `t`. [`metrics`](crate::metrics) has it for each output.
+    /// exact ones, 0 for none better than the mean of `t`. [`metrics`](crate::metrics) has it for each
+    /// output.
     ///
     /// # Errors
     /// Those of [`predict`](Self::predict) and [`metrics::r2`](crate::metrics::r2).

@@ -94,7 +94,8 @@ impl<A: Scalar> ElmParams<A> {
     ///
     /// // Stands for a file that is read piece by piece.
     /// let chunks = (0..10).map(|chunk| {
-    ///     let x = Array2::from_shape_fn((50, 2), |(i, j)| ((chunk * 50 + i) as f64 * (0.1 + j as f64)).sin());
+    ///     let angle = |i, j| (chunk * 50 + i) as f64 * (0.1 + j as f64);
+    ///     let x = Array2::from_shape_fn((50, 2), |(i, j)| angle(i, j).sin());
     ///     let t = x.map_axis(Axis(1), |row| row[0] * row[1]);
     ///     Ok::<_, Error>((x, t))
     /// });

@@ -119,8 +119,8 @@ impl<A: Scalar> Targets<A> for Vec<A> {
     }
 }
 
-/// The dimension of targets and of predictions: [`Ix1`](type@Ix1), one value per row, or [`Ix2`](type@Ix2), shape (rows,
-/// outputs). Sealed.
+/// The dimension of targets and of predictions: [`Ix1`](type@Ix1), one value per row, or [`Ix2`](type@Ix2),
+/// shape (rows, outputs). Sealed.
 pub trait TargetDim: Dimension + sealed::Matrix {
     /// One value for each output: the value itself, or a vector of them.
     type PerOutput<T>;

@@ -104,8 +104,8 @@ impl<'a, A: Scalar, D: TargetDim> Dataset<'a, A, D> {
     /// every platform.
     ///
     /// # Errors
-    /// [`Error::Parameter`](crate::Error::Parameter) unless there are at least 2 folds, and at most as many as
-    /// rows or groups.
+    /// [`Error::Parameter`](crate::Error::Parameter) unless there are at least 2 folds, and at most as many
+    /// as rows or groups.
     #[doc(alias = "GroupKFold")]
     pub fn folds(&self, folds: usize, seed: u64) -> Result<Vec<usize>> {
         match self.groups {

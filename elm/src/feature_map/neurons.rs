@@ -65,8 +65,8 @@ pub enum NodeType {
     #[cfg_attr(feature = "serde", serde(alias = "projection"))]
     Additive,
     /// The distance $\lVert s \odot (x - c_k) \rVert$ from a center, a training row drawn for the
-    /// neuron (no row twice until all are taken; in proportion to its weight), with each input multiplied by the scale of the
-    /// weights, $s$. With [`Activation::Gaussian`] this is a radial basis function
+    /// neuron (no row twice until all are taken; in proportion to its weight), with each input multiplied
+    /// by the scale of the weights, $s$. With [`Activation::Gaussian`] this is a radial basis function
     /// $e^{-\lVert s \odot (x - c_k) \rVert^2}$, whose width is the scale's inverse.
     #[cfg_attr(feature = "serde", serde(alias = "radial"))]
     Rbf,
@@ -82,7 +82,11 @@ pub enum NodeType {
 /// let x = Array1::linspace(-3.0, 3.0, 100).insert_axis(Axis(1));
 /// let params = ElmParams::new(20)
 ///     .with_activation(Activation::Tanh)
-///     .with_group(NeuronGroup::new(10, Activation::Sine).with_scale(3.0).with_biases(Biases::AtTrainingRows))
+///     .with_group(
+///         NeuronGroup::new(10, Activation::Sine)
+///             .with_scale(3.0)
+///             .with_biases(Biases::AtTrainingRows),
+///     )
 ///     .with_group(NeuronGroup::rbf(10));
 /// let model = params.fit(&x, &x.mapv(|x: f64| x.abs()))?;
 /// assert_eq!(model.hidden().neurons(), 40);

@@ -45,9 +45,9 @@ impl<A: Scalar> ElmParams<A> {
     }
 
     /// Solves for the output weights of a feature map that is there already: drawn by
-    /// [`FeatureMapParams`](crate::advanced::FeatureMapParams), [pruned](FeatureMap::subset), or of layers that were
-    /// [joined](crate::advanced::HiddenLayer::joined). Of these settings the solver, the intercept and the bounds
-    /// count.
+    /// [`FeatureMapParams`](crate::advanced::FeatureMapParams), [pruned](FeatureMap::subset), or of layers
+    /// that were [joined](crate::advanced::HiddenLayer::joined). Of these settings the solver, the
+    /// intercept and the bounds count.
     ///
     /// The hidden-layer matrix is never there as a whole where [`Ridge`](crate::solve::Ridge) of a given
     /// strength allows that.
@@ -123,8 +123,8 @@ impl<A: Scalar> ElmParams<A> {
     /// has one label per row, and rows of one label are predicted by the fit to all others.
     ///
     /// Ridge has the same strength in every fold, given or chosen on all rows, and inputs are
-    /// standardized on all rows; [`cross_validation`](crate::cross_validation) says what that leaks. Predictions are
-    /// not held to the [`bounds`](crate::bounds) of the other rows.
+    /// standardized on all rows; [`cross_validation`](crate::cross_validation) says what that leaks.
+    /// Predictions are not held to the [`bounds`](crate::bounds) of the other rows.
     ///
     /// # Errors
     /// Those of [`fit`](Self::fit) for the data and of [`CrossValidator::k_fold`];

@@ -337,8 +337,8 @@ impl<A: Scalar> DesignSvdWithRows<A> {
         columns
     }
 
-    /// Fills [`one_minus_leverage`](Self::one_minus_leverage), and mends [`residual`](Self::residual) where it is small
-    /// because the row determines its own fit.
+    /// Fills [`one_minus_leverage`](Self::one_minus_leverage), and mends [`residual`](Self::residual) where
+    /// it is small because the row determines its own fit.
     fn measure_freedom(&mut self) {
         let u = &self.u;
         self.one_minus_leverage = Array1::from_shape_fn(u.nrows(), |i| {

@@ -134,8 +134,8 @@ pub struct Tuner<A: Scalar> {
 }
 
 impl<A: Scalar> ElmParams<A> {
-    /// Chooses everything: neurons, weight scale, a scale per input, direct links and regularization, for tanh
-    /// neurons with their biases on the data, within 60 factorizations.
+    /// Chooses everything: neurons, weight scale, a scale per input, direct links and regularization, for
+    /// tanh neurons with their biases on the data, within 60 factorizations.
     #[must_use]
     pub fn auto() -> Tuner<A> {
         let base = Self::new(1)
