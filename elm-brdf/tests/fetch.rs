@@ -301,7 +301,7 @@ fn real() -> Option<Vec<(String, Vec<u8>)>> {
 }
 
 #[test]
-#[ignore = "needs data: CUReT"]
+#[ignore = "in a build with the feature fetch, needs data: CUReT"]
 fn the_real_files_have_the_sums_known() {
     let Some(files) = real() else { return };
     let dir = tempfile::tempdir().unwrap();

@@ -71,9 +71,10 @@ pub(crate) fn all() -> Result {
         say("skipped: tests on real measurements");
         Tiers::without_data().run()?;
     }
-    // Not among the default features.
+    // Not among the default features; without data one of them says 'skipped'.
     run(command(
-        "cargo test -p elm-brdf --features fetch --test fetch --test help --locked",
+        "cargo test -p elm-brdf --features fetch --test fetch --test help --locked \
+         -- --include-ignored",
     ))?;
 
     step("documentation, warnings are errors");
