@@ -95,6 +95,6 @@ pub use tune::Tuner;
 pub use uncertainty::UncertainElm;
 
 // The README's code is compiled and run with the documentation tests.
-#[cfg(doctest)]
+#[cfg(all(doctest, feature = "persist"))]
 #[doc = include_str!("../README.md")]
 struct Readme;

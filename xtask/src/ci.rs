@@ -85,8 +85,8 @@ pub(crate) fn all() -> Result {
     step("the OpenBLAS back end");
     for line in [
         "cargo clippy -p elm-learn --all-targets --no-default-features \
-         --features openblas-system --locked -- -D warnings",
-        "cargo test -p elm-learn --no-default-features --features openblas-system --locked",
+         --features openblas-system,persist --locked -- -D warnings",
+        "cargo test -p elm-learn --no-default-features --features openblas-system,persist --locked",
         "cargo test -p elm-tests --no-default-features --features openblas-system --locked",
     ] {
         run(command(line))?;

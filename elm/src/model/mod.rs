@@ -51,6 +51,7 @@ pub(crate) use fit::Drawn;
 /// In JSON and the like settings have these names, too, and those that are missing their defaults:
 ///
 /// ```
+/// # #[cfg(feature = "serde")] {
 /// use elm::{Activation, ElmParams};
 ///
 /// let text = r#"{ "neurons": 20, "activation": "tanh", "solver": "pseudo-inverse" }"#;
@@ -59,7 +60,8 @@ pub(crate) use fit::Drawn;
 ///     .with_activation(Activation::Tanh)
 ///     .with_solver(elm::solve::PseudoInverse::default());
 /// assert_eq!(params, same);
-/// # Ok::<(), serde_json::Error>(())
+/// # }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct ElmParams<A: Scalar> {
