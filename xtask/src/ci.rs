@@ -99,7 +99,7 @@ pub(crate) fn all() -> Result {
     tools()?;
 
     step("packages");
-    Packaging::default().run()?;
+    Packaging::contents().run()?;
 
     step("the README's command, on synthetic data and on real measurements where they are");
     run(command(
