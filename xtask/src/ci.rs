@@ -35,12 +35,15 @@ fn tools() -> Result {
     run_if_installed("typos", "typos")?;
     run_if_installed("cargo-deny", "cargo-deny check bans licenses sources")?;
     run_if_installed("cargo-machete", "cargo-machete")?;
-    run(command(
-        "cargo check -p elm-learn --features rayon --locked",
-    ))?;
-    run(command(
-        "cargo check -p elm-brdf --no-default-features --features faer --locked",
-    ))?;
+    for features in [
+        "-p elm-learn --features rayon",
+        "-p elm-learn --no-default-features --features faer",
+        "-p elm-brdf --no-default-features --features faer",
+    ] {
+        run(command(&format!(
+            "cargo clippy {features} --locked -- -D warnings"
+        )))?;
+    }
     let oldest = env!("CARGO_PKG_RUST_VERSION");
     let toolchain = format!("rustup run {oldest}.0 cargo");
     run_if_installed(
@@ -72,6 +75,9 @@ pub(crate) fn all() -> Result {
         Tiers::without_data().run()?;
     }
     // Not among the default features; without data one of them says 'skipped'.
+    run(command(
+        "cargo clippy -p elm-brdf --all-targets --features fetch --locked -- -D warnings",
+    ))?;
     run(command(
         "cargo test -p elm-brdf --features fetch --test fetch --test help --locked \
          -- --include-ignored",

@@ -72,12 +72,12 @@ const TABLES: &[(&str, &str, &str)] = &[
     ),
     (
         "render-costs",
-        "scenes.md: savings",
+        "rendering.md: savings",
         "cargo run --release --locked -p elm-brdf --example render_costs -- {curet}",
     ),
     (
         "spheres",
-        "scenes.md: RGL spheres",
+        "rendering.md: RGL spheres",
         "cargo test --release --locked -p elm-brdf --test rgl_spheres -- --ignored --nocapture",
     ),
 ];
@@ -161,4 +161,13 @@ fn commands_are_completed_by_the_package_that_has_the_program() {
         by_cargo("elm-brdf compare"),
         format!("{run} elm-brdf -- compare")
     );
+}
+
+#[test]
+fn every_table_stands_in_a_report_that_is_there() {
+    for (name, place, _) in TABLES {
+        let file = place.split(':').next().unwrap_or_default();
+        let path = root().join("docs/reports").join(file);
+        assert!(path.is_file(), "{name}: {}", path.display());
+    }
 }
