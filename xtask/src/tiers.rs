@@ -115,8 +115,9 @@ fn only(names: &[&str]) -> Result<Counts> {
     Ok(counts)
 }
 
-/// The tests with `#[ignore = "..."]` in all packages, by their functions' names. A reason that does not begin with
-/// 'needs' keeps a test out of the tiers: one that is built only with a feature that is not a default.
+/// The tests with `#[ignore = "..."]` in all packages, by their functions' names. A reason that does not
+/// begin with 'needs' keeps a test out of the tiers: one that is built only with a feature that is not a
+/// default.
 fn ignored(dir: &Path) -> Result<Vec<Ignored>> {
     let mut found = Vec::new();
     let error = |error: std::io::Error| format!("{}: {error}", dir.display());
