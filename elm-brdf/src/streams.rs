@@ -14,6 +14,8 @@ pub(crate) const ANCHORS: Stream = Stream::Application(2);
 pub(crate) const JUDGED: Stream = Stream::Application(3);
 /// Rows of the search for a compact network.
 pub(crate) const COMPACT: Stream = Stream::Application(4);
+/// Directions at which a small network is fitted to a large one.
+pub(crate) const DISTILL: Stream = Stream::Application(6);
 /// Rows that a method is given which cannot take all.
 pub(crate) const SUBSAMPLE: Stream = Stream::Application(5);
 

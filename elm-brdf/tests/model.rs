@@ -153,7 +153,7 @@ fn below_either_horizon_a_model_is_black() {
     }
 }
 
-/// Models of every kind of layer: averaged, of one draw, pruned, given, laid on rows, with direct links.
+/// Models of every kind of layer: of few measurements, of a given size, of many, given, laid on rows, with direct links.
 fn kinds() -> Vec<BrdfModel> {
     let (pairs, values) = measured(12);
     let paint = paint::samples(3200, 1).unwrap();
@@ -203,19 +203,19 @@ fn models_come_back_from_files_of_both_forms_bit_for_bit() {
 
 #[test]
 fn stored_numbers_are_those_that_the_file_holds() {
-    let [averaged, single, pruned, given, on_rows, linked] = kinds().try_into().unwrap();
-    // Weights; for each input its mean, its factor and a scale in each draw; constant, offset and
-    // ceiling. Twice as many as were measured.
-    let (neurons, inputs) = (
-        averaged.network().hidden().neurons(),
-        averaged.network().inputs(),
-    );
+    let [few, sized, pruned, given, on_rows, linked] = kinds().try_into().unwrap();
+    // Weights; for each input its mean, its factor and its scale; constant, offset and ceiling; a bit for
+    // each neuron drawn, two for one that is kept.
+    let (neurons, inputs) = (few.network().hidden().neurons(), few.network().inputs());
     assert_eq!(
-        averaged.stored_floats(),
-        neurons + (2 + Tuned::MEMBERS) * inputs + 3
+        few.stored_floats(),
+        neurons + 3 * inputs + 3 + (2 * neurons).div_ceil(32)
     );
-    assert_eq!(averaged.stored_floats(), 410);
-    assert_eq!(single.stored_floats(), 40 * 3 + 4 + 3 + 8 + 6);
+    assert_eq!(few.stored_floats(), 205);
+    assert_eq!(
+        sized.stored_floats(),
+        (40 + 3) * 3 + 4 + 8 + 80_usize.div_ceil(32)
+    );
     // 160 drawn, a bit each.
     let channels = pruned.channels();
     assert_eq!(

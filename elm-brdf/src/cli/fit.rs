@@ -149,14 +149,15 @@ fn number(value: f64) -> String {
 
 fn describe(model: &BrdfModel, counts: &str, seconds: f64) -> String {
     let about = model.provenance();
+    let neurons = model.network().hidden().neurons();
     let mut text = format!(
         "{} measurements of {}, channels {}\n\
          {counts}\n\
-         {} neurons on '{}', {} stored numbers, fitted in {seconds:.3} s\n",
+         {neurons} {} on '{}', {} stored numbers, fitted in {seconds:.3} s\n",
         about.rows,
         about.data,
         about.channels.join(", "),
-        model.network().hidden().neurons(),
+        if neurons == 1 { "neuron" } else { "neurons" },
         model.features(),
         model.stored_floats(),
     );

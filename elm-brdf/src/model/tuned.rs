@@ -2,10 +2,12 @@
 
 mod anchors;
 mod censored;
+mod distill;
 mod errors;
 mod few;
 mod finish;
 mod lean;
+mod limit;
 mod many;
 mod moments;
 mod problem;
@@ -22,6 +24,7 @@ use super::{BrdfModel, Draw, Provenance};
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::fit::{Fit, Model, check};
+use crate::link::{FittedLink, Link};
 use crate::metrics::Metric;
 use crate::quality;
 use elm_datasets::Brdf;
@@ -43,28 +46,30 @@ use problem::Problem;
 /// | `max_floats` | none | most numbers that the model may store |
 /// | `seed` | 1 | random layers, and rows drawn for the search |
 ///
-/// **Inputs** are chosen among all sets but the paper's. Of networks that are equally good to 3 % the
-/// reciprocal one is taken, of others the one of sums and differences if it is not worse by a tenth, and
-/// before any of them one whose [albedo](crate::albedo) is physical: at no
-/// angle above 1, unless that of the nearest measurements is.
+/// **Few measurements** (up to [`FEW`](Tuned::FEW)): sine neurons with random frequencies. The inputs are
+/// those, of three sets, of which the evidence of a network of infinitely many neurons is largest, and
+/// their scales are what makes it so; that network is a Gaussian process, solved in closed form. The
+/// most useful of the neurons drawn are [kept](elm::prune) and fitted to what it says, where something was
+/// measured and where nothing was.
 ///
-/// **Few measurements** (up to [`Tuned::MANY`]): sine neurons with random frequencies. The scales of
-/// the inputs are tried from a fixed low-discrepancy set and ranked by their
-/// [evidence](elm::cross_validation::CrossValidator::log_evidence); the neurons of the best
-/// [`MEMBERS`](Tuned::MEMBERS) stand side by side in one network, which stores no more numbers than twice as
-/// many as were measured, nor than a thousand or half as many. With `neurons` or `max_floats` given, the
-/// best alone is taken.
+/// **Many measurements** (more than [`LIMIT`](Tuned::LIMIT)): inputs and scales by a search on part of the
+/// rows, judged on others, among all sets but the paper's; of networks that are equally good to 3 % a
+/// reciprocal one is taken. Then more neurons than wanted are drawn and the less useful are pruned. One
+/// solve on all rows finds the output weights; its strength of regularisation makes small the error at
+/// rows left out, five folds in turn. Where nothing was measured the nearest measurements pull weakly, so
+/// that the network is tame there.
 ///
-/// **Many measurements**: inputs and scales by a search on part of the rows, judged on others; then
-/// more neurons than wanted are drawn and the less useful are [pruned](elm::prune). 213 neurons unless
-/// said otherwise, which for three channels is 675 stored numbers.
+/// **In between** both are done, and the one that is better at rows left out is taken.
 ///
-/// Either way one solve on all rows, weighted by what the metric makes of an error, finds the output
-/// weights. Its strength of regularisation makes small the error at rows left out, five folds in turn, and
-/// with it the error that single precision would add. Where nothing was measured the nearest measurements
-/// pull weakly, so that the network is tame there. Noise of dark values is accounted for: the link's offset
-/// is at least three of its standard deviations, and where RMSE is asked for the fit is of the mean value,
-/// not of the value of the mean target.
+/// Rows are weighted by what the metric makes of an error, and the error that single precision would make
+/// counts in the choice of the strength. A network whose [albedo](crate::albedo) is physical, at no angle above
+/// 1 unless that of the nearest measurements is, is taken before any other. Noise of dark values is
+/// accounted for: the link's offset is at least three of its standard deviations, and where RMSE is asked
+/// for the fit is of the mean value, not of the value of the mean target.
+///
+/// **Size**, unless it is given: at most 213 neurons, which for three channels is 675 stored numbers; no more
+/// numbers than were measured, and of more than 1,000 at most half as many, but always
+/// a few neurons.
 ///
 /// The errors in the model's [provenance](super::Provenance) are those of the network itself at rows left
 /// out, its output weights found without them; its inputs and their scales were chosen with all rows.
@@ -112,12 +117,27 @@ impl Default for Tuned {
 }
 
 impl Tuned {
+    /// With no more measurements than this they count as few.
+    pub const FEW: usize = 600;
     /// With more measurements than this they count as many.
-    pub const MANY: usize = 3000;
+    pub const LIMIT: usize = 1500;
+    /// Sets of inputs for many measurements: all but the paper's, which no material is best served by.
+    const MANY_SETS: [Features; 7] = [
+        Features::HalfDiff,
+        Features::Cosines,
+        Features::SumDifference,
+        Features::ReciprocalCosines,
+        Features::Highlight,
+        Features::Algebraic,
+        Features::HighlightCosines,
+    ];
+    /// For fewer: one that tells light from viewer and two reciprocal ones, of which one spreads out
+    /// highlights and the other what returns to the light. The evidence of few measurements tells these
+    /// apart; of others, chosen on part of the directions, it did not say how they go on beyond
+    /// (docs/reports/accuracy.md).
+    const FEW_SETS: [Features; 3] = [Features::Cosines, Features::Highlight, Features::HalfDiff];
     /// Neurons that measurements always warrant, if there are as many.
-    const FEWEST: usize = 48;
-    /// Candidates whose neurons stand side by side for few measurements.
-    pub const MEMBERS: usize = 3;
+    const FEWEST: usize = 16;
 
     /// Fits one network for all channels of `values` (BRDF in 1/sr, shape (pairs, channels)).
     ///
@@ -129,51 +149,88 @@ impl Tuned {
         values: ArrayView2<'_, f64>,
     ) -> Result<BrdfModel> {
         check(pairs, values)?;
-        let all: Vec<usize> = (0..values.ncols()).collect();
-        if pairs.len() > Self::MANY {
-            return many::fit(self, pairs, values);
+        let mut link = Link::default_log().fit(values)?;
+        if pairs.len() > Self::LIMIT {
+            let rows = many::search_rows(self, pairs.len());
+            let sets = self.sets(&Self::MANY_SETS);
+            let mut settings = many::search(self, &link, pairs, values, &rows, &sets)?;
+            let noise = settings.first().map_or(Vec::new(), many::Setting::noise);
+            let raised = link.raise_offsets(&noise);
+            if raised.iter().any(|&factor| factor > 1.0) {
+                settings = many::search(self, &link, pairs, values, &rows, &sets)?;
+            }
+            let problem = self.problem(pairs, values, link, noise, &raised)?;
+            let found = many::best(&problem, &settings, &rows)?;
+            return model_of(&problem, found);
         }
-        let mut models = few::fit(self, pairs, values, &[all])?;
-        models.pop().ok_or(Error::NoConvergence {
-            what: "the search for a network",
-        })
+        let mut search = few::Search::new(self, pairs, values, &link)?;
+        let noise = search.noise(&link)?;
+        let raised = link.raise_offsets(&noise);
+        if raised.iter().any(|&factor| factor > 1.0) {
+            search = few::Search::new(self, pairs, values, &link)?;
+        }
+        let problem = self.problem(pairs, values, link, noise, &raised)?;
+        let mut found = search.best(&problem)?;
+        if pairs.len() > Self::FEW {
+            let rows = many::search_rows(self, pairs.len());
+            let sets = self.sets(&Self::FEW_SETS);
+            let settings = many::search(self, &problem.link, pairs, values, &rows, &sets)?;
+            let other = many::best(&problem, &settings, &rows)?;
+            if other.score < SURELY * found.score || found.excess > 0.0 {
+                found = better(found, other);
+            }
+        }
+        model_of(&problem, found)
     }
 
-    /// The sets of inputs to choose among: all but the paper's, which no material is best served by.
-    fn sets(&self) -> Vec<Features> {
-        let all = || Features::ALL.into_iter().filter(|&s| s != Features::Paper);
-        self.features
-            .map_or_else(|| all().collect(), |set| vec![set])
+    fn problem<'a>(
+        &'a self,
+        pairs: &'a [DirectionPair],
+        values: ArrayView2<'a, f64>,
+        link: FittedLink,
+        noise: Vec<f64>,
+        raised: &[f64],
+    ) -> Result<Problem<'a>> {
+        let noisy = raised.iter().any(|&factor| factor > NOISY);
+        Problem::new(self, pairs, values, link, noise, noisy)
     }
 
-    /// The most numbers to be stored: what is asked for, or twice what was measured, up to a thousand or,
-    /// of many, half; `None` where the neurons are given and the numbers are not.
+    /// The sets of inputs to choose among: one where it is given.
+    fn sets(&self, sets: &[Features]) -> Vec<Features> {
+        self.features.map_or_else(|| sets.to_vec(), |set| vec![set])
+    }
+
+    /// The most numbers to be stored: what is asked for, or what was measured, or of many half of it;
+    /// `None` where the neurons are given and the numbers are not.
     fn most_floats(&self, rows: usize, channels: usize) -> Option<usize> {
         let measured = rows * channels;
-        let warranted = (2 * measured).min((measured / 2).max(1000));
+        let warranted = if measured > 1000 {
+            measured / 2
+        } else {
+            measured
+        };
         match (self.max_floats, self.neurons) {
             (None, None) => Some(warranted),
             (asked, _) => asked,
         }
     }
 
-    /// The neurons that the limits allow, or `usual`, in `draws` draws. `drawn` says how many are
-    /// drawn for so many to be kept, which of them being a bit each.
-    fn size_of(
+    /// The neurons that the limits allow, or `usual`. `drawn` says how many are drawn for so many to be
+    /// kept, which of them being a bit each.
+    fn size(
         &self,
         usual: usize,
         rows: usize,
         inputs: usize,
         channels: usize,
-        draws: usize,
         drawn: impl Fn(usize) -> usize,
     ) -> Result<usize> {
         let wanted = self.neurons.unwrap_or(usual);
         let Some(most) = self.most_floats(rows, channels) else {
             return Ok(wanted);
         };
-        // Mean and factor of each input, scales of each draw; constant and link of each channel.
-        let fixed = (2 + draws) * inputs + 3 * channels;
+        // Mean, factor and scale of each input; constant and link of each channel.
+        let fixed = 3 * inputs + 3 * channels;
         let floats = |neurons: usize| fixed + channels * neurons + drawn(neurons).div_ceil(32);
         let largest = match (self.neurons, self.max_floats) {
             (Some(neurons), _) => neurons,
@@ -193,18 +250,6 @@ impl Tuned {
                 expected: "enough for the scales, the links and one neuron: some 20 and more",
             }),
         }
-    }
-
-    /// The same where all that are drawn are kept.
-    fn size(
-        &self,
-        usual: usize,
-        rows: usize,
-        inputs: usize,
-        channels: usize,
-        draws: usize,
-    ) -> Result<usize> {
-        self.size_of(usual, rows, inputs, channels, draws, |_| 0)
     }
 
     /// Sine neurons of normal frequencies at three scales: heavier tails than one scale has.
@@ -235,15 +280,9 @@ impl Fit for Tuned {
 
     fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         check(pairs, values)?;
-        let each: Vec<Vec<usize>> = (0..values.ncols()).map(|channel| vec![channel]).collect();
-        let models = if pairs.len() > Self::MANY {
-            each.iter()
-                .map(|channel| many::fit(self, pairs, values.select(Axis(1), channel).view()))
-                .collect::<Result<_>>()?
-        } else {
-            few::fit(self, pairs, values, &each)?
-        };
-        Ok(SideBySide(models))
+        let channels = (0..values.ncols())
+            .map(|channel| self.fit_model(pairs, values.select(Axis(1), &[channel]).view()));
+        Ok(SideBySide(channels.collect::<Result<_>>()?))
     }
 }
 
@@ -326,10 +365,13 @@ const NOISY: f64 = 5.0;
 /// How much worse a reciprocal network may be and still be taken.
 const TIE: f64 = 1.03;
 
+/// A network of few measurements is as smooth as they say; another must have an error this much smaller
+/// to be taken instead: on a grid, rows left out say little of what is between its lines.
+const SURELY: f64 = 0.8;
+
 /// The better of two networks: one whose albedo is physical, then the one with the smaller error, where
-/// that of others than sums and differences counts `others` times and of what is not reciprocal [`TIE`]
-/// times.
-fn better(one: Finished, other: Finished, others: f64) -> Finished {
+/// that of what is not reciprocal counts [`TIE`] times.
+fn better(one: Finished, other: Finished) -> Finished {
     let physical = |finished: &Finished| finished.excess <= 0.0;
     match (physical(&one), physical(&other)) {
         (true, false) => return one,
@@ -344,14 +386,12 @@ fn better(one: Finished, other: Finished, others: f64) -> Finished {
         (true, true) => {}
     }
     let handicap = |finished: &Finished| {
-        let set = finished.features;
-        let unusual = if set == Features::SumDifference {
-            1.0
+        let reciprocal = finished.features.is_reciprocal();
+        if reciprocal {
+            finished.score
         } else {
-            others
-        };
-        let tie = if set.is_reciprocal() { 1.0 } else { TIE };
-        unusual * tie * finished.score
+            TIE * finished.score
+        }
     };
     if handicap(&other) < handicap(&one) {
         other

@@ -180,7 +180,7 @@ impl Anchors {
 
 /// Pairs of directions over the hemisphere: half of [`ANCHORS`] anywhere by both angles, half by the
 /// half vector, near the mirror direction; and [`GRAZING`] ones in both of whose directions near the horizon.
-fn scatter(random: &mut ChaCha8Rng) -> Vec<DirectionPair> {
+pub(super) fn scatter(random: &mut ChaCha8Rng) -> Vec<DirectionPair> {
     let mut pairs = Vec::with_capacity(ANCHORS + GRAZING);
     while pairs.len() < ANCHORS {
         if pairs.len() % 2 == 0 {

@@ -1,332 +1,270 @@
-//! Few measurements: inputs and their scales by evidence, the best layers side by side.
+//! Few measurements: inputs and their scales by the evidence of networks of infinitely many neurons, then a
+//! small network that is like the best of them.
 
 use std::f64::consts::PI;
 
-use elm::{Activation, Biases, Distribution, ElmParams, Scaler};
-use ndarray::{Array1, Array2, ArrayView2, Axis, Slice};
+use elm::{Activation, Biases, ElmParams, Scaler};
+use ndarray::{Array1, Array2, ArrayView2, Axis};
 use rand::seq::index;
 
+use super::censored::Censored;
+use super::distill::Teacher;
 use super::errors::{dark_noise, row_weights};
 use super::finish::Finished;
-use super::moments::Moments;
+use super::limit::{Limit, Rows, Setting, Smoothness};
 use super::problem::Problem;
-use super::{Drawn, NOISY, Tuned, better, model_of};
+use super::{Drawn, Tuned, better};
 use crate::error::{Error, Result};
 use crate::features::Features;
-use crate::link::{FittedLink, Link};
-use crate::model::BrdfModel;
-use crate::scales::spread;
+use crate::link::FittedLink;
+use crate::metrics::Metric;
 use crate::streams::{self, generator};
 use elm_datasets::geometry::DirectionPair;
 
-/// Most neurons, unless they are asked for.
-const NEURONS: usize = 400;
-/// Measurements for each candidate that takes part in the network.
-const MEMBER: usize = 50;
-/// Neurons of a candidate in the search.
-const SEARCH_NEURONS: usize = 128;
-/// Rows that candidates are judged by, at most.
-const SEARCH_ROWS: usize = 600;
-/// Candidates for the scales of inputs: for every set of inputs, and for the sets that look best.
-const FIRST: usize = 20;
-const CANDIDATES: usize = 96;
-/// Sets that look best.
-const SETS: usize = 2;
-/// Scales tried, in units of the inputs' standard deviations: from nearly linear to several waves.
-const SCALES: (f64, f64) = (0.05, 3.3);
-/// Degrees of freedom of the frequencies: those of Matérn's covariance 5/2.
-const FREEDOM: u8 = 5;
-/// Strengths tried, relative to the sum of the columns' squares.
-const STRENGTHS: [f64; 6] = [1e-10, 1e-8, 1e-7, 1e-6, 1e-5, 1e-3];
-/// Sets that are fitted to all rows, at most, where none returns less light than it receives.
-const MOST_FINISHED: usize = 4;
-/// Factor on the error of sets other than sums and differences. What is left out of a few hundred
-/// rows has neighbours nearly everywhere: it says little of how a network goes on from the measurements
-/// to a highlight that was not measured, which sums and differences, of which directions are linear, do
-/// best. On 13 materials of CUReT the set with the least error on rows left out had an RMSE of 0.0197 on
-/// folds that it did not see, with 1.3 or more it was 0.0120, as with sums and differences alone.
-const OTHERS: f64 = 1.3;
-/// Another set is fitted too where its evidence is lower by no more than this for each row: an error
-/// of the targets that is higher by this share.
-const CLOSE: f64 = 0.03;
+/// Most neurons, unless they are asked for, and how many are drawn for each that is kept.
+const NEURONS: usize = 213;
+const DRAWN: usize = 2;
+/// Rows and rounds of the search: for every set of inputs, and for those that look best.
+const FIRST: (usize, usize) = (120, 15);
+const SECOND: (usize, usize) = (240, 14);
+/// Sets whose evidence is lower than the best by no more than this for each value look as good.
+const CLOSE: f64 = 0.3;
+/// Rows that the limit is fitted to, at most: it costs their cube.
+const LIMIT_ROWS: usize = 600;
+/// Folds for the noise.
+const FOLDS: usize = 5;
+/// Groups of rows by their targets.
+const GROUPS: usize = 32;
 
-/// One model for each group of channels.
-pub(super) fn fit(
-    tuned: &Tuned,
-    pairs: &[DirectionPair],
-    values: ArrayView2<'_, f64>,
-    groups: &[Vec<usize>],
-) -> Result<Vec<BrdfModel>> {
-    let mut link = Link::default_log().fit(values)?;
-    let mut search = Search::new(tuned, pairs, values, &link)?;
-    search.run(groups)?;
-    let noise = search.noise(groups, &link)?;
-    let raised = link.raise_offsets(&noise);
-    if raised.iter().any(|&factor| factor > 1.0) {
-        search = Search::new(tuned, pairs, values, &link)?;
-        search.run(groups)?;
-    }
-    let fit_group = |channels: &Vec<usize>| {
-        let values = values.select(Axis(1), channels);
-        let link = link.select(channels);
-        let noise = channels.iter().map(|&channel| noise[channel]).collect();
-        let noisy = channels.iter().any(|&channel| raised[channel] > NOISY);
-        let problem = Problem::new(tuned, pairs, values.view(), link, noise, noisy)?;
-        model_of(&problem, search.fitted(channels, &problem)?)
-    };
-    groups.iter().map(fit_group).collect()
-}
-
-/// A set of inputs, and its candidates so far.
-struct Set {
-    features: Features,
-    /// Of all rows, and of those of the search.
-    x: Array2<f64>,
-    part: Array2<f64>,
-    scaler: Scaler<f64>,
-    /// Shape (candidates, inputs).
-    scales: Array2<f64>,
-    /// For each candidate tried, the log evidence of each channel at its best strength, and that
-    /// strength.
-    tried: Vec<Vec<(f64, f64)>>,
-}
-
-impl Set {
-    /// The candidates by their evidence for these channels, the best first.
-    fn ranked(&self, channels: &[usize]) -> Vec<(f64, usize)> {
-        let sum = |tried: &Vec<(f64, f64)>| channels.iter().map(|&c| tried[c].0).sum::<f64>();
-        let mut ranked: Vec<(f64, usize)> = self.tried.iter().map(sum).zip(0..).collect();
-        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        ranked
-    }
-
-    fn best(&self, channels: &[usize]) -> f64 {
-        let ranked = self.ranked(channels);
-        ranked.first().map_or(f64::NEG_INFINITY, |best| best.0)
-    }
-}
-
-/// What is common to all candidates.
-struct Search<'a> {
+/// Sets of inputs with the best setting of each, the best set first.
+pub(super) struct Search<'a> {
     tuned: &'a Tuned,
+    /// The rows of the limit, those of the search first.
     rows: Vec<usize>,
-    values: ArrayView2<'a, f64>,
-    targets: Array2<f64>,
-    weights: Option<Array1<f64>>,
-    sets: Vec<Set>,
+    values: Array2<f64>,
+    found: Vec<Found>,
+}
+
+/// A set of inputs, and its best setting.
+struct Found {
+    features: Features,
+    scaler: Scaler<f64>,
+    rows: Rows,
+    setting: Setting,
 }
 
 impl<'a> Search<'a> {
-    fn new(
+    pub(super) fn new(
         tuned: &'a Tuned,
         pairs: &[DirectionPair],
-        values: ArrayView2<'a, f64>,
+        values: ArrayView2<'_, f64>,
         link: &FittedLink,
     ) -> Result<Self> {
+        let targets = link.to_targets(values)?;
         let mut random = generator(tuned.seed, streams::FEW);
-        let count = pairs.len().min(SEARCH_ROWS);
-        let rows = index::sample(&mut random, pairs.len(), count).into_vec();
-        let sets = tuned.sets().into_iter().map(|features| {
-            let x = features.compute_training(pairs);
-            Ok(Set {
-                features,
-                part: x.select(Axis(0), &rows),
-                scaler: Scaler::measured(&x)?,
-                scales: spread(CANDIDATES, x.ncols(), SCALES),
-                x,
-                tried: Vec::new(),
-            })
-        });
+        let drawn = index::sample(&mut random, pairs.len(), pairs.len()).into_vec();
+        let mut rows = evenly(&drawn, &targets);
+        rows.truncate(LIMIT_ROWS);
+        let targets = targets.select(Axis(0), &rows);
         let weights = row_weights(tuned.metric, pairs, values, link);
+        let spread = weights.map_or_else(
+            || Array1::ones(rows.len()),
+            |weights| {
+                let weights = weights.select(Axis(0), &rows);
+                let mean = weights.mean().unwrap_or(1.0);
+                weights.mapv(|weight| mean / weight.max(1e-6 * mean))
+            },
+        );
+        let sets = tuned.sets(&Tuned::FEW_SETS);
+        let mut found: Vec<Found> = sets
+            .into_iter()
+            .map(|features| {
+                let x = features.compute_training(pairs);
+                let scaler = Scaler::measured(&x)?;
+                let rows = Rows {
+                    x: standardised(&scaler, &x.select(Axis(0), &rows)),
+                    targets: targets.clone(),
+                    spread: spread.clone(),
+                };
+                Found::first(features, scaler, rows)
+            })
+            .collect::<Result<_>>()?;
+        sort(&mut found);
+        let per_value = |rows: usize| (targets.nrows().min(rows) * targets.ncols()) as f64;
+        let most = found[0].setting.evidence;
+        let least = most - CLOSE * per_value(FIRST.0);
+        let (mut close, others): (Vec<_>, Vec<_>) = found
+            .into_iter()
+            .partition(|found| found.setting.evidence >= least);
+        for found in &mut close {
+            found.improve(SECOND)?;
+        }
+        sort(&mut close);
+        close.extend(others);
         Ok(Self {
-            sets: sets.collect::<Result<_>>()?,
-            targets: link.to_targets(values)?.select(Axis(0), &rows),
-            weights: weights.map(|weights| weights.select(Axis(0), &rows)),
             tuned,
-            values,
+            values: values.select(Axis(0), &rows),
             rows,
+            found: close,
         })
     }
 
-    /// Tries some candidates of all sets, and all of those that look best for some group.
-    fn run(&mut self, groups: &[Vec<usize>]) -> Result<()> {
-        for set in 0..self.sets.len() {
-            self.extend(set, FIRST)?;
-        }
-        let mut chosen: Vec<usize> = groups
-            .iter()
-            .flat_map(|channels| self.order(channels).into_iter().take(SETS))
-            .collect();
-        chosen.sort_unstable();
-        chosen.dedup();
-        for set in chosen {
-            self.extend(set, CANDIDATES)?;
-        }
-        Ok(())
-    }
-
-    /// The sets by their evidence for these channels, the best first.
-    fn order(&self, channels: &[usize]) -> Vec<usize> {
-        let best: Vec<f64> = self.sets.iter().map(|set| set.best(channels)).collect();
-        let mut order: Vec<usize> = (0..self.sets.len()).collect();
-        order.sort_by(|&a, &b| best[b].total_cmp(&best[a]));
-        order
-    }
-
-    fn extend(&mut self, set: usize, count: usize) -> Result<()> {
-        for candidate in self.sets[set].tried.len()..count {
-            let h = self.hidden(&self.sets[set], candidate)?;
-            let moments = Moments::of(h.view(), self.targets.view(), self.weights.as_ref());
-            let mut most = vec![(f64::NEG_INFINITY, STRENGTHS[0]); self.targets.ncols()];
-            for strength in STRENGTHS {
-                let strength = strength * moments.scale();
-                let Some(factor) = moments.factor(strength) else {
-                    continue;
-                };
-                for (most, evidence) in most.iter_mut().zip(factor.evidence(&moments)?) {
-                    if evidence > most.0 {
-                        *most = (evidence, strength);
-                    }
-                }
-            }
-            self.sets[set].tried.push(most);
-        }
-        Ok(())
-    }
-
-    fn params(&self, set: &Set, candidate: usize, neurons: usize) -> ElmParams<f64> {
-        ElmParams::new(neurons)
-            .with_activation(Activation::Sine)
-            .with_distribution(Distribution::StudentT(FREEDOM))
-            .with_biases(Biases::Scaled(PI))
-            .with_input_scales(set.scales.row(candidate).to_vec())
-            .with_bounded(false)
-            // Candidates draw for themselves, so that those averaged err differently.
-            .with_seed(self.tuned.seed.wrapping_add(1000 * (candidate as u64 + 1)))
-    }
-
-    /// The hidden-layer matrix of a candidate at the rows of the search.
-    fn hidden(&self, set: &Set, candidate: usize) -> Result<Array2<f64>> {
-        let params = self.params(set, candidate, SEARCH_NEURONS);
-        let drawn = Drawn::new(&params, set.part.ncols(), &set.scaler)?;
-        Ok(drawn.map.transform(&set.part)?)
-    }
-
-    /// The standard deviation of the noise of each channel's dark half, in 1/sr: of what its best
-    /// candidate is off by at rows left out, by the median, which a few bad rows do not move.
-    fn noise(&self, groups: &[Vec<usize>], link: &FittedLink) -> Result<Vec<f64>> {
-        let mut noise = vec![0.0; self.values.ncols()];
-        let rows = self.rows.len();
-        if rows < 4 * FOLDS {
-            return Ok(noise);
-        }
-        for channels in groups {
-            let Some(&best) = self.order(channels).first() else {
-                continue;
-            };
-            let set = &self.sets[best];
-            let Some(&(_, candidate)) = set.ranked(channels).first() else {
-                continue;
-            };
-            let h = self.hidden(set, candidate)?;
-            let link = link.select(channels);
-            let targets = self.targets.select(Axis(1), channels);
-            let strength = set.tried[candidate][channels[0]].1;
-            let Some(fitted) = left_out(&h, &targets, self.weights.as_ref(), strength)? else {
-                continue;
-            };
-            let fitted = link.to_values(fitted)?;
-            let values = self.values.select(Axis(0), &self.rows);
-            for (fitted, &channel) in fitted.columns().into_iter().zip(channels) {
-                noise[channel] = dark_noise(fitted, values.column(channel));
+    /// The standard deviation of the noise of each channel's dark half, in 1/sr: of what the best
+    /// set is off by at rows left out, by the median, which a few bad rows do not move.
+    pub(super) fn noise(&self, link: &FittedLink) -> Result<Vec<f64>> {
+        let count = self.rows.len();
+        let channels = self.values.ncols();
+        let Some(best) = self.found.first().filter(|_| count >= 4 * FOLDS) else {
+            return Ok(vec![0.0; channels]);
+        };
+        let fold = |fold: usize| (fold..count).step_by(FOLDS).collect();
+        let folds: Vec<Vec<usize>> = (0..FOLDS).map(fold).collect();
+        let limit = Limit::new(&best.rows, &best.setting, &folds)?;
+        let (_, without) = limit.predict(&best.rows.x);
+        let mut held_out = Array2::zeros((count, channels));
+        for (fold, without) in folds.iter().zip(&without) {
+            for &row in fold {
+                held_out.row_mut(row).assign(&without.row(row));
             }
         }
-        Ok(noise)
+        let held_out = link.to_values(held_out)?;
+        let columns = held_out.columns().into_iter().zip(self.values.columns());
+        Ok(columns
+            .map(|(fitted, values)| dark_noise(fitted, values))
+            .collect())
     }
 
-    /// The best of the sets that are close to the best, for these channels.
-    fn fitted(&self, channels: &[usize], problem: &Problem<'_>) -> Result<Finished> {
-        let order = self.order(channels);
-        let most = order
-            .first()
-            .map_or(f64::NEG_INFINITY, |&set| self.sets[set].best(channels));
-        let least = most - CLOSE * (self.rows.len() * channels.len()) as f64;
-        let mut found: Option<Finished> = None;
-        for (number, &set) in order.iter().enumerate() {
-            let set = &self.sets[set];
-            let usual = set.features == Features::SumDifference;
-            let close = usual || set.best(channels) >= least && number < SETS + 1;
-            let physical = found.as_ref().is_some_and(|found| found.excess <= 0.0);
-            if physical && !close || number >= MOST_FINISHED && !usual {
-                continue;
-            }
-            let finished = self.finished(set, channels, problem)?;
-            found = Some(match found {
+    /// The network of the best set, or, where its albedo is not physical, of another.
+    pub(super) fn best(&self, problem: &Problem<'_>) -> Result<Finished> {
+        let mut best: Option<Finished> = None;
+        for found in &self.found {
+            let finished = self.finished(found, problem)?;
+            let known = best.take();
+            let chosen = match known {
                 None => finished,
-                Some(known) => better(known, finished, OTHERS),
-            });
+                Some(known) => better(known, finished),
+            };
+            if chosen.excess <= 0.0 {
+                return Ok(chosen);
+            }
+            best = Some(chosen);
         }
-        found.ok_or(Error::NoConvergence {
+        best.ok_or(Error::NoConvergence {
             what: "the search for a network",
         })
     }
 
-    /// The best candidates of a set side by side in one network.
-    fn finished(&self, set: &Set, channels: &[usize], problem: &Problem<'_>) -> Result<Finished> {
-        let tuned = self.tuned;
-        let limited = tuned.neurons.is_some() || tuned.max_floats.is_some();
-        let inputs = set.x.ncols();
-        let members = if limited {
-            1
+    fn finished(&self, found: &Found, problem: &Problem<'_>) -> Result<Finished> {
+        let mut place = vec![None; problem.pairs.len()];
+        for (number, &row) in self.rows.iter().enumerate() {
+            place[row] = Some(number);
+        }
+        let of_fold = |fold: &Vec<usize>| fold.iter().filter_map(|&row| place[row]).collect();
+        let folds: Vec<Vec<usize>> = problem.folds().iter().map(of_fold).collect();
+        let setting = if problem.noisy {
+            found.rows.calmest(&found.setting)?
         } else {
-            // Some thirty neurons each at least.
-            (set.x.nrows() / MEMBER).clamp(1, Tuned::MEMBERS)
+            found.setting.clone()
         };
-        let neurons = tuned.size(NEURONS, set.x.nrows(), inputs, channels.len(), members)?;
-        let members = members.min(neurons);
-        let ranked = set.ranked(channels).into_iter().take(members).enumerate();
-        let drawn = ranked.map(|(member, (_, candidate))| {
-            let share = (neurons + member) / members;
-            Drawn::new(&self.params(set, candidate, share), inputs, &set.scaler)
-        });
-        let drawn: Vec<Drawn> = drawn.collect::<Result<_>>()?;
-        problem.finish(set.features, &set.scaler, &drawn, &set.x)
+        let mut limit = Limit::new(&found.rows, &setting, &folds)?;
+        if self.tuned.metric == Metric::Rmse {
+            self.fit_means(&mut limit, problem)?;
+        }
+        let inputs = found.rows.x.ncols();
+        let rows = problem.pairs.len();
+        let channels = self.values.ncols();
+        let drawn = |neurons: usize| DRAWN * neurons;
+        let neurons = self.tuned.size(NEURONS, rows, inputs, channels, drawn)?;
+        let params = ElmParams::new(drawn(neurons))
+            .with_activation(Activation::Sine)
+            .with_distribution(setting.smoothness.frequencies())
+            .with_biases(Biases::Scaled(PI))
+            .with_input_scales(setting.scales.to_vec())
+            .with_bounded(false)
+            .with_seed(self.tuned.seed);
+        let candidates = Drawn::new(&params, inputs, &found.scaler)?;
+        let teacher = Large { found, limit };
+        problem.distilled(found.features, &teacher, candidates, &params, neurons)
+    }
+
+    /// Fits the mean value instead of the value of the mean target; see
+    /// [`Problem::finish`](super::problem::Problem).
+    fn fit_means(&self, limit: &mut Limit, problem: &Problem<'_>) -> Result<()> {
+        let mut censored = Censored::new(self.values.view(), &problem.noise);
+        for _ in 0..censored.rounds() {
+            let fitted = limit.fitted();
+            let means = problem.link.to_values(fitted.clone())?;
+            let values = censored.completed(self.values.view(), means.view());
+            let working = problem.link.working_targets(fitted.view(), values.view())?;
+            limit.fit(&working);
+            censored.learn();
+        }
+        Ok(())
     }
 }
 
-/// Folds for the noise.
-const FOLDS: usize = 5;
-
-/// The targets of each row by the fit without its fold; rows are in random order.
-fn left_out(
-    h: &Array2<f64>,
-    targets: &Array2<f64>,
-    weights: Option<&Array1<f64>>,
-    strength: f64,
-) -> Result<Option<Array2<f64>>> {
-    let rows = h.nrows();
-    let part = |rows: std::ops::Range<usize>| {
-        let rows = Slice::from(rows);
-        let weights = weights.map(|weights| weights.slice_axis(Axis(0), rows).to_owned());
-        let (h, targets) = (
-            h.slice_axis(Axis(0), rows),
-            targets.slice_axis(Axis(0), rows),
-        );
-        Moments::of(h, targets, weights.as_ref())
-    };
-    let all = part(0..rows);
-    let mut fitted = Array2::zeros(targets.dim());
-    for fold in 0..FOLDS {
-        let fold = fold * rows / FOLDS..(fold + 1) * rows / FOLDS;
-        let mut others = all.clone();
-        others.add(&part(fold.clone()), -1.0);
-        let Some(factor) = others.factor(strength) else {
-            return Ok(None);
-        };
-        let weights = factor.solve(&others)?;
-        let fold = Slice::from(fold);
-        let mut there = fitted.slice_axis_mut(Axis(0), fold);
-        there.assign(&weights.apply(h.slice_axis(Axis(0), fold)));
+impl Found {
+    /// The best setting that few rows tell.
+    fn first(features: Features, scaler: Scaler<f64>, rows: Rows) -> Result<Self> {
+        let some = first_of(&rows, FIRST.0);
+        let mut settings = Vec::with_capacity(Smoothness::ALL.len());
+        for smoothness in Smoothness::ALL {
+            settings.push(some.improved(&some.start(smoothness)?, FIRST.1)?);
+        }
+        settings.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        Ok(Self {
+            features,
+            scaler,
+            rows,
+            setting: settings.swap_remove(0),
+        })
     }
-    Ok(Some(fitted))
+
+    fn improve(&mut self, (rows, rounds): (usize, usize)) -> Result<()> {
+        self.setting = first_of(&self.rows, rows).improved(&self.setting, rounds)?;
+        Ok(())
+    }
+}
+
+/// The limit of a set of inputs.
+struct Large<'a> {
+    found: &'a Found,
+    limit: Limit,
+}
+
+impl Teacher for Large<'_> {
+    fn targets(&self, pairs: &[DirectionPair]) -> (Array2<f64>, Vec<Array2<f64>>) {
+        let x = self.found.features.compute(pairs);
+        self.limit.predict(&standardised(&self.found.scaler, &x))
+    }
+}
+
+fn first_of(rows: &Rows, count: usize) -> Rows {
+    rows.select(&(0..rows.x.nrows().min(count)).collect::<Vec<_>>())
+}
+
+fn sort(found: &mut [Found]) {
+    found.sort_by(|a, b| b.setting.evidence.total_cmp(&a.setting.evidence));
+}
+
+fn standardised(scaler: &Scaler<f64>, x: &Array2<f64>) -> Array2<f64> {
+    (x - &scaler.mean()) * scaler.factor()
+}
+
+/// The rows in an order of which every beginning has targets from the whole range evenly, as far as there
+/// are any: a highlight of few rows is among the first.
+fn evenly(rows: &[usize], targets: &Array2<f64>) -> Vec<usize> {
+    let means = targets.mean_axis(Axis(1)).unwrap_or_default();
+    let low = means.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = means.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let mut groups = vec![Vec::new(); GROUPS];
+    for &row in rows.iter().rev() {
+        let place = (means[row] - low) / (high - low).max(f64::MIN_POSITIVE);
+        groups[((place * GROUPS as f64) as usize).min(GROUPS - 1)].push(row);
+    }
+    let mut ordered = Vec::with_capacity(rows.len());
+    while ordered.len() < rows.len() {
+        ordered.extend(groups.iter_mut().filter_map(Vec::pop));
+    }
+    ordered
 }

@@ -9,7 +9,7 @@
 
 use elm::advanced::{FeatureMap, HiddenLayer};
 
-use elm::{Elm, Scaler};
+use elm::Elm;
 use ndarray::{Array1, Array2, Axis, Slice};
 
 use super::Drawn;
@@ -22,11 +22,11 @@ use super::survey::Survey;
 use crate::error::Result;
 use crate::features::Features;
 use crate::metrics::{Metric, Metrics};
-use crate::model::Layer;
+use crate::model::{Draw, Layer};
 
 /// The squared error that rounding makes counts so many times: what is exported is to be better
 /// than what rounding alone leaves.
-const ROUNDING: f64 = 25.0;
+pub(super) const ROUNDING: f64 = 25.0;
 /// While the albedo is not physical they count ten times as much, so many times.
 const STEPS: usize = 6;
 /// Rounds of working residuals end where targets move by a two-thousandth of their size.
@@ -44,20 +44,43 @@ pub(super) struct Finished {
     pub(super) excess: f64,
 }
 
+/// A network, and what is known of it.
+pub(super) struct Fitted {
+    pub(super) network: Elm<f64>,
+    /// What is predicted for the targets of the rows of the folds, each by the fit without its fold.
+    pub(super) held_out: Array2<f64>,
+    /// By how much the albedo is above what it may be, 0 where it is not.
+    pub(super) excess: f64,
+}
+
 impl Problem<'_> {
-    /// Fits the output weights of the layers of `drawn` together; `x` has the inputs of all rows.
+    /// Judges a network.
+    pub(super) fn finished(
+        &self,
+        features: Features,
+        draw: Draw,
+        fitted: Fitted,
+    ) -> Result<Finished> {
+        Ok(Finished {
+            features,
+            layer: Layer::Drawn(vec![draw]),
+            score: self.score(&fitted.held_out)?,
+            held_out: self.metrics(&fitted.held_out)?,
+            network: fitted.network,
+            excess: fitted.excess,
+        })
+    }
+
+    /// Fits the output weights of a layer to the rows, whose inputs are `x`.
     pub(super) fn finish(
         &self,
         features: Features,
-        scaler: &Scaler<f64>,
-        drawn: &[Drawn],
+        drawn: &Drawn,
         x: &Array2<f64>,
     ) -> Result<Finished> {
-        let layers = drawn.iter().map(|drawn| drawn.map.layer().clone());
-        let layer = HiddenLayer::joined(&layers.collect::<Vec<_>>())?;
-        let reach = reach(&layer);
-        let map = FeatureMap::new(Some(scaler.clone()), layer, false)?;
-        let rows = Rows::new(self, &map, x)?;
+        let map = &drawn.map;
+        let reach = reach(map.layer());
+        let rows = Rows::new(self, map, x)?;
         let (strength, held_out) = self.strength(&rows, &reach, None, (2..STRENGTHS).step_by(2))?;
         let at_anchors = map.transform(&features.compute(&self.anchors.pairs))?;
         let mut pull = Pull::new(self, at_anchors, &self.variances(&held_out));
@@ -66,7 +89,7 @@ impl Problem<'_> {
         for _ in 0..=STEPS {
             let near = rows.near(strength);
             let (strength, held_out) = self.strength(&rows, &reach, Some(&pull), near)?;
-            let weights = self.solve(&rows, &map, x, strength, &pull)?;
+            let weights = self.solve(&rows, map, x, strength, &pull)?;
             let network = Elm::from_parts(map.clone(), weights.beta, weights.intercept)?;
             let excess = survey.excess(features, &network, &self.link, |pairs| {
                 self.neighbours_guess(pairs)
@@ -83,15 +106,12 @@ impl Problem<'_> {
         let Some((network, held_out, excess)) = best else {
             return Err(no_fit());
         };
-        let draws = drawn.iter().map(|drawn| drawn.draw.clone()).collect();
-        Ok(Finished {
-            features,
-            layer: Layer::Drawn(draws),
+        let fitted = Fitted {
             network,
-            score: self.score(&held_out)?,
-            held_out: self.metrics(&held_out)?,
+            held_out,
             excess,
-        })
+        };
+        self.finished(features, drawn.draw.clone(), fitted)
     }
 
     fn metrics(&self, held_out: &Array2<f64>) -> Result<Option<Metrics>> {
@@ -279,7 +299,7 @@ impl Problem<'_> {
 }
 
 /// The size of the sum that each neuron's function is applied to, of standardised inputs.
-fn reach(hidden: &HiddenLayer<f64>) -> Array1<f64> {
+pub(super) fn reach(hidden: &HiddenLayer<f64>) -> Array1<f64> {
     let squares = hidden.weights().mapv(|w| w * w).sum_axis(Axis(0));
     (squares + hidden.biases().mapv(|b| b * b)).mapv(f64::sqrt)
 }

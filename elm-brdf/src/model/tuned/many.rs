@@ -9,12 +9,11 @@ use rand::seq::index;
 use super::errors::{cut_off_means, dark_noise, geometric_root};
 use super::finish::Finished;
 use super::problem::Problem;
-use super::{Drawn, NOISY, TIE, Tuned, better, dataset, model_of};
+use super::{Drawn, TIE, Tuned, better, dataset};
 use crate::error::{Error, Result};
 use crate::features::Features;
-use crate::link::{FittedLink, Link};
+use crate::link::FittedLink;
 use crate::metrics::{Metric, Metrics};
-use crate::model::BrdfModel;
 use crate::streams::{self, generator};
 use elm_datasets::geometry::DirectionPair;
 
@@ -48,23 +47,30 @@ fn drawn(neurons: usize) -> usize {
     (4 * neurons).min((neurons + neurons / 2).max(320))
 }
 
-pub(super) fn fit(
+/// Rows that the search fits to, and others that judge.
+pub(super) fn search_rows(tuned: &Tuned, rows: usize) -> Vec<usize> {
+    let mut random = generator(tuned.seed, streams::MANY);
+    index::sample(&mut random, rows, rows.min(2 * SEARCH_ROWS)).into_vec()
+}
+
+/// The best settings for these targets, the best first.
+pub(super) fn search(
     tuned: &Tuned,
+    link: &FittedLink,
     pairs: &[DirectionPair],
     values: ArrayView2<'_, f64>,
-) -> Result<BrdfModel> {
-    let mut link = Link::default_log().fit(values)?;
-    let mut random = generator(tuned.seed, streams::MANY);
-    let wanted = pairs.len().min(2 * SEARCH_ROWS);
-    let rows = index::sample(&mut random, pairs.len(), wanted).into_vec();
-    let mut settings = Search::new(tuned, &link, pairs, values, &rows)?.best()?;
-    let noise = settings.first().map_or(Vec::new(), Setting::noise);
-    let raised = link.raise_offsets(&noise);
-    if raised.iter().any(|&factor| factor > 1.0) {
-        settings = Search::new(tuned, &link, pairs, values, &rows)?.best()?;
-    }
-    let noisy = raised.iter().any(|&factor| factor > NOISY);
-    let problem = Problem::new(tuned, pairs, values, link, noise, noisy)?;
+    rows: &[usize],
+    sets: &[Features],
+) -> Result<Vec<Setting>> {
+    Search::new(tuned, link, pairs, values, rows)?.best(sets)
+}
+
+/// The best network of some of the settings.
+pub(super) fn best(
+    problem: &Problem<'_>,
+    settings: &[Setting],
+    rows: &[usize],
+) -> Result<Finished> {
     let mut found: Option<Finished> = None;
     for (number, setting) in settings.iter().enumerate() {
         let physical = found.as_ref().is_some_and(|found| found.excess <= 0.0);
@@ -73,16 +79,13 @@ pub(super) fn fit(
         if physical && !close || number >= MOST_FINISHED && !usual {
             continue;
         }
-        let finished = finished(&problem, setting, &rows)?;
+        let finished = finished(problem, setting, rows)?;
         found = Some(match found {
             None => finished,
-            Some(known) => better(known, finished, 1.0),
+            Some(known) => better(known, finished),
         });
     }
-    let Some(found) = found else {
-        return Err(no_search());
-    };
-    model_of(&problem, found)
+    found.ok_or_else(no_search)
 }
 
 fn no_search() -> Error {
@@ -97,7 +100,7 @@ fn finished(problem: &Problem<'_>, setting: &Setting, rows: &[usize]) -> Result<
     let x = setting.set.compute_training(problem.pairs);
     let scaler = Scaler::measured(&x)?;
     let channels = problem.values.ncols();
-    let neurons = tuned.size_of(NEURONS, x.nrows(), x.ncols(), channels, 1, drawn)?;
+    let neurons = tuned.size(NEURONS, x.nrows(), x.ncols(), channels, drawn)?;
     let count = drawn(neurons);
     let few = &rows[..rows.len().min(PRUNE_ROWS.max(count))];
     let params = tuned.waves(count, &setting.scales);
@@ -111,7 +114,7 @@ fn finished(problem: &Problem<'_>, setting: &Setting, rows: &[usize]) -> Result<
         Keep::Neurons(neurons),
     )?;
     let layer = layer.pruned(&pruned.kept)?;
-    problem.finish(setting.set, &scaler, &[layer], &x)
+    problem.finish(setting.set, &layer, &x)
 }
 
 /// Some of the rows.
@@ -134,7 +137,8 @@ fn part(
     }
 }
 
-struct Setting {
+/// Inputs, their scales, and what comes of them.
+pub(super) struct Setting {
     set: Features,
     scales: Vec<f64>,
     error: f64,
@@ -145,7 +149,7 @@ struct Setting {
 
 impl Setting {
     /// The standard deviation of the noise of each channel's dark half, in 1/sr.
-    fn noise(&self) -> Vec<f64> {
+    pub(super) fn noise(&self) -> Vec<f64> {
         let columns = self.predicted.columns().into_iter();
         columns
             .zip(self.measured.columns())
@@ -200,9 +204,9 @@ impl<'a> Search<'a> {
 
     /// For every set its best setting: of those that are good at the first scale of all inputs and its
     /// neighbours, with each input's scale moved until that no longer pays. The best first.
-    fn best(&self) -> Result<Vec<Setting>> {
+    fn best(&self, sets: &[Features]) -> Result<Vec<Setting>> {
         let mut found: Vec<(Inputs, Setting)> = Vec::new();
-        for set in self.tuned.sets() {
+        for &set in sets {
             let inputs = self.inputs(set)?;
             let mut best: Option<Setting> = None;
             for scale in [1.0, 2.0, 0.5].map(|factor| factor * FIRST_SCALE) {
