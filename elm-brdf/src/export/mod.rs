@@ -14,7 +14,6 @@
 //! use elm::{Activation, ElmParams, solve::Ridge};
 //! use elm_brdf::export::{Language, source};
 //! use elm_brdf::{features::Features, link::Link, model::BrdfParams};
-//! use elm_datasets::geometry::pairs;
 //! use elm_datasets::{Invalid, MaterialId, synthetic};
 //!
 //! let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);

@@ -176,7 +176,10 @@ impl Tuned {
             let sets = self.sets(&Self::FEW_SETS);
             let settings = many::search(self, &problem.link, pairs, values, &rows, &sets)?;
             let other = many::best(&problem, &settings, &rows)?;
-            if other.score < SURELY * found.score || found.excess > 0.0 {
+            if problem.noisy && other.excess <= found.excess {
+                // Of noisy rows all count, and the limit has some of them.
+                found = other;
+            } else if other.score < SURELY * found.score || found.excess > 0.0 {
                 found = better(found, other);
             }
         }

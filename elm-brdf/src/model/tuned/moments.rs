@@ -109,7 +109,7 @@ impl Moments {
         let about_mean = |k: usize| (square(k) - self.gram[[neurons, k]].powi(2) / total).max(0.0);
         let squares: f64 = (0..neurons).map(square).sum();
         let sum: f64 = (0..neurons).map(about_mean).sum();
-        let rounded = (total + 1.0) * f64::EPSILON * squares;
+        let rounded = WEAKEST * squares;
         [sum, squares]
             .into_iter()
             .find(|&sum| sum > rounded && sum.is_finite())
