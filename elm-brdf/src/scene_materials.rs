@@ -401,6 +401,7 @@ fn read(path: &Path, material: &MaterialTable) -> Result<(Samples, Vec<String>)>
             channels: material.channels.clone(),
             ignore: material.ignore.clone(),
             scatter_cosine: weighted == Some("theta_o"),
+            ..scattered::Columns::default()
         },
         invalid,
         ..OpenOptions::default()

@@ -153,7 +153,8 @@ fn below_either_horizon_a_model_is_black() {
     }
 }
 
-/// Models of every kind of layer: of few measurements, of a given size, of many, given, laid on rows, with direct links.
+/// Models of every kind of layer: of few measurements, of a given size, of many, given, laid on rows,
+/// with direct links.
 fn kinds() -> Vec<BrdfModel> {
     let (pairs, values) = measured(12);
     let paint = paint::samples(3200, 1).unwrap();

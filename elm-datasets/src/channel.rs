@@ -290,6 +290,13 @@ pub(crate) fn kind(name: &str) -> Kind {
     }
 }
 
+/// Whether a name says that values are reflectance factors: the BRDF times pi.
+pub(crate) fn is_reflectance_factor(name: &str) -> bool {
+    let words = words(name);
+    let has = |word: &str| words.iter().any(|other| other == word);
+    ["brf", "hdrf", "hcrf"].into_iter().any(has) || has("reflectance") && has("factor")
+}
+
 /// Whether a name is a single word, and one that says something else than reflectance.
 pub(crate) fn is_one_word_for_something_else(name: &str) -> bool {
     match words(name).as_slice() {

@@ -1,29 +1,71 @@
 //! Reads whole files with a limit on their size, and writes files that are complete or absent.
 
 use std::fs;
-use std::io::{self, BufWriter, Read as _, Write};
+use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
+
+use flate2::read::MultiGzDecoder;
 
 use crate::error::{Error, MAX_FILE_BYTES};
 
-/// The whole file, unless it is larger than any of these formats gets.
+/// The path that means standard input.
+pub(crate) const STANDARD_INPUT: &str = "-";
+
+/// What every file compressed by gzip begins with.
+const GZIP: [u8; 2] = [0x1f, 0x8b];
+
+/// The whole file, unless it is larger than any of these formats gets; of a file compressed by gzip
+/// what it holds, and of `-` standard input.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, Error> {
     let failed = |reason| Error::Read {
         path: path.to_owned(),
         reason,
     };
-    let file = fs::File::open(path).map_err(failed)?;
-    let found = file.metadata().map_err(failed)?.len();
-    if found > MAX_FILE_BYTES {
-        let path = path.to_owned();
-        return Err(Error::TooLarge { path, found });
+    let too_large = |found| Error::TooLarge {
+        path: path.to_owned(),
+        found,
+    };
+    let whole = |stream: &mut dyn Read| {
+        let mut bytes = Vec::new();
+        // A pipe has no length to look at.
+        let mut limited = stream.take(MAX_FILE_BYTES + 1);
+        limited.read_to_end(&mut bytes).map_err(failed)?;
+        let found = bytes.len() as u64;
+        if found > MAX_FILE_BYTES {
+            return Err(too_large(found));
+        }
+        Ok(bytes)
+    };
+    let bytes = if path == Path::new(STANDARD_INPUT) {
+        whole(&mut io::stdin().lock())?
+    } else {
+        let mut file = fs::File::open(path).map_err(failed)?;
+        let found = file.metadata().map_err(failed)?.len();
+        if found > MAX_FILE_BYTES {
+            return Err(too_large(found));
+        }
+        whole(&mut file)?
+    };
+    if bytes.starts_with(&GZIP) {
+        whole(&mut MultiGzDecoder::new(bytes.as_slice()))
+    } else {
+        Ok(bytes)
     }
-    let mut bytes = Vec::new();
-    // A pipe has no length to look at.
-    file.take(MAX_FILE_BYTES)
-        .read_to_end(&mut bytes)
-        .map_err(failed)?;
-    Ok(bytes)
+}
+
+/// The first bytes of a file, at most `count`; of a file compressed by gzip those of what it holds.
+pub(crate) fn start(path: &Path, count: u64) -> io::Result<Vec<u8>> {
+    let mut start = Vec::new();
+    fs::File::open(path)?.take(count).read_to_end(&mut start)?;
+    if start.starts_with(&GZIP) {
+        let mut inside = Vec::new();
+        // What is cut off is no fault here.
+        let _ = MultiGzDecoder::new(start.as_slice())
+            .take(count)
+            .read_to_end(&mut inside);
+        return Ok(inside);
+    }
+    Ok(start)
 }
 
 /// Puts the whole file in place in one step, or leaves what was there. The folder is made if it is

@@ -1,8 +1,6 @@
 //! Reads samples from a file of any format that this crate knows.
 
 use std::fmt;
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 use std::str::FromStr;
 
@@ -11,13 +9,15 @@ use ndarray::Axis;
 use crate::merl::Merl;
 use crate::rgl::Rgl;
 use crate::text::shorten;
-use crate::{Error, Invalid, Samples, Sampling, channel, fill_values, merl, pbrt, rgl, scattered};
+use crate::{
+    Error, Invalid, Samples, Sampling, channel, file, fill_values, merl, pbrt, rgl, scattered,
+};
 
 /// A file format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Format {
-    /// [Scattered samples as CSV](scattered), `.csv`.
+    /// [Scattered samples as CSV](scattered), `.csv`, and other tables of text, `.tsv`.
     Scattered,
     /// [A MERL table](merl), `.binary`.
     Merl,
@@ -42,20 +42,21 @@ impl Format {
         }
     }
 
-    /// The format of a file: by its first bytes where they tell, otherwise by the end of its name.
+    /// The format of a file: by its first bytes where they tell, otherwise by the end of its name. A file
+    /// compressed by gzip is of the format of what it holds; `-`, standard input, is a table.
     ///
     /// # Errors
     /// [`Error::Read`] if the file cannot be read, [`Error::OtherFormat`] if it is of a format that
     /// has no reader here, [`Error::UnknownFormat`] if nothing tells.
     pub fn of(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
-        let mut start = Vec::new();
-        File::open(path)
-            .and_then(|file| file.take(1 << 12).read_to_end(&mut start))
-            .map_err(|reason| Error::Read {
-                path: path.to_owned(),
-                reason,
-            })?;
+        if path == Path::new(file::STANDARD_INPUT) {
+            return Ok(Self::Scattered);
+        }
+        let start = file::start(path, 1 << 12).map_err(|reason| Error::Read {
+            path: path.to_owned(),
+            reason,
+        })?;
         if rgl::begins(&start) {
             return Ok(Self::Rgl);
         }
@@ -68,9 +69,17 @@ impl Format {
                 what,
             });
         }
-        let end = path.extension().unwrap_or_default();
+        let end = |path: &Path| path.extension().unwrap_or_default().to_owned();
+        let compressed = end(path).eq_ignore_ascii_case("gz");
+        let end = if compressed {
+            path.file_stem()
+                .map_or_else(Default::default, |stem| end(Path::new(stem)))
+        } else {
+            end(path)
+        };
         [
             ("csv", Self::Scattered),
+            ("tsv", Self::Scattered),
             ("binary", Self::Merl),
             ("bsdf", Self::Rgl),
             ("brdf", Self::Pbrt),
@@ -153,7 +162,7 @@ impl FromStr for Format {
 /// | `columns` | all that can be reflectance | which columns of a CSV file are channels |
 /// | `sampling` | 20,000 at random | where to look up a tabulated BRDF: MERL and RGL |
 /// | `invalid` | clamp | what to do with negative values that are measured |
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct OpenOptions {
     /// The format; `None` to find it out.
     pub format: Option<Format>,

@@ -24,10 +24,21 @@
 //! - Rows whose viewer is below the surface are transmitted light, and left out, if any others are
 //!   left.
 //! - Degrees that are all below 1.571, with azimuths up to 6.28, are radians, and an error.
+//!
+//! # Other tables
+//! Cells may be separated by semicolons, tabs or blanks, with commas in the numbers for points; lines
+//! that begin with `#`, `%`, `!` or `//` are comments, and so is what stands before the names of the
+//! columns. Angles are known by other names, too (`Theta_in (deg)`, `thi`, `phi_r`, `view zenith`, `SZA`),
+//! and `phi`, `dphi` or `relative azimuth` is the difference of the azimuths; azimuths that are no column
+//! are 0. A unit in the names is taken, one in the comments where the angles bear it out. Columns named `BRF`
+//! or `reflectance factor` are divided by pi. Each of these is one of the [notes](Note). Files compressed
+//! by gzip are read as what they hold, and the path `-` is standard input.
 
 mod angles;
 mod columns;
+mod dialect;
 mod long;
+mod names;
 mod note;
 
 use std::io::{self, Read, Write};
@@ -36,14 +47,15 @@ use std::path::Path;
 use ndarray::{Array2, Axis};
 
 use crate::csv::{Cells, Table, line_of};
-use crate::error::scattered::{ANGLES, VECTORS};
+use crate::error::scattered::ANGLES;
 pub use crate::error::scattered::{AngleUnit, List, Problem};
 use crate::geometry::{Angles, DirectionPair};
 use crate::text::shorten;
 use crate::{Error, Samples, channel, file};
 pub(crate) use angles::HORIZON_TOLERANCE;
 use angles::{Found, Reader};
-use columns::Plan;
+use columns::{Angle, Plan};
+use dialect::{Separator, Text};
 pub use note::Note;
 
 /// What the file itself does not say.
@@ -56,7 +68,7 @@ pub struct Options {
 }
 
 /// Which columns are channels, and what their values are, where their names do not say it.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Columns {
     /// The channels, in this order; all that can be reflectance if there are none here. Names are
     /// those of columns, or colours or wavelengths that they are of.
@@ -66,6 +78,11 @@ pub struct Columns {
     /// Whether the values are BRDF times the cosine of `theta_o`, the scatter angle. They are then
     /// divided by it.
     pub scatter_cosine: bool,
+    /// Angles that are the same in every row and so no column, in the order `theta_i`, `phi_i`,
+    /// `theta_o`, `phi_o` and the unit of the file.
+    pub angles: [Option<f64>; 4],
+    /// Whether the values are reflectance factors, BRDF times pi. They are then divided by pi.
+    pub reflectance_factor: bool,
 }
 
 /// Reads samples from a CSV file.
@@ -112,15 +129,11 @@ pub fn from_reader(
     }
 }
 
-/// Whether the first line names directions.
+/// Whether one of the first lines names directions.
 pub(crate) fn begins(bytes: &[u8]) -> bool {
-    let text = bytes.trim_ascii_start();
-    let line = text.split(|&byte| byte == b'\n').next().unwrap_or_default();
-    let is = |name: &&str| {
-        let mut words = line.split(|&byte| byte == b',').map(<[u8]>::trim_ascii);
-        words.any(|word| word.eq_ignore_ascii_case(name.as_bytes()))
-    };
-    ANGLES.iter().all(is) || VECTORS.iter().all(is)
+    let whole = std::str::from_utf8(bytes);
+    let text = whole.or_else(|error| std::str::from_utf8(&bytes[..error.valid_up_to()]));
+    text.is_ok_and(|text| text.lines().any(dialect::is_header))
 }
 
 /// What was in a table: samples, of which a value that is missing is NaN, and what was assumed.
@@ -162,6 +175,8 @@ fn parse(
         line,
         problem,
     };
+    let text = Text::of(bytes);
+    let bytes = text.as_ref().map_or(bytes, |text| &text.bytes);
     // A byte order mark is no line.
     let head = || line_of(bytes, 0);
     let names = Table::names(path, bytes)?;
@@ -179,16 +194,26 @@ fn parse(
         let begin = begins.get(row).copied().unwrap_or(u64::MAX);
         error(line_of(bytes, begin), problem)
     };
+    let (options, mut notes) =
+        unit(text.as_ref(), &table, &plan, options).map_err(|problem| error(head(), problem))?;
     let Reflected {
         rows,
         mut samples,
-        mut notes,
-    } = reflected(&table, &plan, options, choice).map_err(|(row, problem)| {
+        notes: more,
+    } = reflected(&table, &plan, &options, choice).map_err(|(row, problem)| {
         row.map_or_else(
             || error(head(), problem.clone()),
             |row| at(row, problem.clone()),
         )
     })?;
+    notes.extend(more);
+    let mut channels = plan.channels.iter();
+    if choice.reflectance_factor
+        || channels.all(|&column| channel::is_reflectance_factor(&names[column]))
+    {
+        samples.values /= std::f64::consts::PI;
+        notes.push(Note::ReflectanceFactors);
+    }
     if let Some(column) = plan.wavelength {
         let wavelengths = table.values.column(column).select(Axis(0), &rows).to_vec();
         samples = long::pivot(&samples, &wavelengths, &names[column])
@@ -206,6 +231,68 @@ fn parse(
         notes.push(Note::LeftOut { columns });
     }
     Ok(Parsed { samples, notes })
+}
+
+/// The options with the unit that the file says, and what was assumed of its text and names.
+fn unit(
+    text: Option<&Text>,
+    table: &Table,
+    plan: &Plan,
+    options: &Options,
+) -> Result<(Options, Vec<Note>), Problem> {
+    let mut options = *options;
+    let mut notes = Vec::new();
+    if let Some(text) = text {
+        if text.separator != Separator::Comma {
+            notes.push(Note::Separated {
+                separator: text.separator.name(),
+                decimal_commas: text.decimal_commas,
+            });
+        }
+        if text.comments > 0 {
+            notes.push(Note::Comments {
+                lines: text.comments,
+            });
+        }
+    }
+    notes.extend(plan.notes.iter().cloned());
+    let columns::Directions::Angles(angles) = plan.directions else {
+        return Ok((options, notes));
+    };
+    let largest = |angle: &Angle| match *angle {
+        Angle::Column(column) => {
+            let sizes = table.values.column(column).mapv(f64::abs);
+            sizes.into_iter().fold(0.0, f64::max)
+        }
+        Angle::Constant(constant) => constant.abs(),
+    };
+    let theta = largest(&angles[0]).max(largest(&angles[2]));
+    let can_be_radians = theta <= std::f64::consts::PI + HORIZON_TOLERANCE;
+    match (plan.unit, text.and_then(|text| text.unit), options.unit) {
+        (Some(AngleUnit::Radians), _, AngleUnit::Degrees) => {
+            return Err(Problem::Units {
+                said: "radians",
+                advice: "leave out --degrees",
+            });
+        }
+        (Some(AngleUnit::Degrees), _, AngleUnit::Radians) => {
+            options.unit = AngleUnit::Degrees;
+            notes.push(Note::Unit {
+                unit: options.unit,
+                place: "the columns' names say",
+            });
+        }
+        // What comments say may be of something else: the angles must bear it out.
+        (None, Some(AngleUnit::Degrees), AngleUnit::Radians) if !can_be_radians => {
+            options.unit = AngleUnit::Degrees;
+            notes.push(Note::Unit {
+                unit: options.unit,
+                place: "the comments say",
+            });
+        }
+        _ => {}
+    }
+    Ok((options, notes))
 }
 
 /// The rows of a table that are above the surface, with their samples, and what was assumed.
@@ -227,7 +314,10 @@ fn reflected(
     let (mut below, mut transmitted) = (None, 0);
     for (row, cells) in table.values.rows().into_iter().enumerate() {
         let found = match plan.directions {
-            columns::Directions::Angles(columns) => reader.angles(columns.map(|c| cells[c])),
+            columns::Directions::Angles(angles) => reader.angles(angles.map(|angle| match angle {
+                Angle::Column(column) => cells[column],
+                Angle::Constant(constant) => constant,
+            })),
             columns::Directions::Vectors(columns) => reader.vectors(columns.map(|c| cells[c])),
         };
         match found.map_err(|problem| (Some(row), problem))? {
@@ -328,11 +418,6 @@ fn wavelengths_asked_for(
     Ok(samples.with_channels(&places))
 }
 
-fn is_direction(name: &str) -> bool {
-    let mut names = ANGLES.iter().chain(&VECTORS);
-    names.any(|direction| direction.eq_ignore_ascii_case(name))
-}
-
 /// Writes samples as angles in radians and their values, each number with as many digits as it
 /// takes to read back the same number. The file comes into place in one step.
 ///
@@ -406,7 +491,7 @@ fn check_samples(samples: &Samples) -> Result<(), (usize, Problem)> {
     for (index, name) in channels.iter().enumerate() {
         let again = channels[..index].contains(name);
         // The reader trims names.
-        if again || name.is_empty() || name.trim() != name || is_direction(name) {
+        if again || name.is_empty() || name.trim() != name || names::of(name).is_some() {
             let name = shorten(name);
             return Err((1, Problem::ChannelName { name }));
         }

@@ -99,7 +99,7 @@ const DAMAGE: &[(&str, &str, Options, &[&str])] = &[
     ("no rows", "theta_i,phi_i,theta_o,phi_o,y\n", RADIANS, &["only a header"]),
     ("no header", "0.1,0,0.1,0,1\n", RADIANS, &["line 1", "names of the columns"]),
     ("no directions", "x,y\n1,2\n", RADIANS, &["line 1", "theta_i, phi_i", "wi_x", "missing theta_i, phi_i, theta_o, phi_o"]),
-    ("an angle missing", "\ntheta_i,phi_i,theta_o,y\n1,2,3,4\n", RADIANS, &["line 2", "missing phi_o"]),
+    ("an angle missing", "\ntheta_i,phi_i,phi_o,y\n1,2,3,4\n", RADIANS, &["line 2", "missing theta_o", "--angle theta_o="]),
     ("a part missing", "wi_x,wi_y,wi_z,wo_x,wo_z,y\n1,2,3,4,5,6\n", RADIANS, &["line 1", "missing wo_y"]),
     ("both sets", "theta_i,phi_i,theta_o,phi_o,wi_x,y\n0,0,0,0,0,1\n", RADIANS, &["line 1", "both"]),
     ("an angle in two spellings", "theta_i,phi_i,theta_o,phi_o,Phi_O,y\n0,0,0,0,0,1\n", RADIANS, &["line 1", "both"]),

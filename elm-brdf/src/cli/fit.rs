@@ -19,14 +19,14 @@ use crate::quality;
 
 /// Fit a network to measurements and save it as one file.
 ///
-/// What is not given is chosen by held-out errors: inputs among all sets (of few measurements
-/// 'sum-difference' unless another is clearly better, of many the reciprocal ones where they tie), and before
-/// any other a network that returns no more light than it receives. Printed are the errors at measurements
+/// What is not given is chosen: inputs by the evidence of few measurements, or by the errors at
+/// measurements left out of many, reciprocal ones where they tie; and before any other a network that
+/// returns no more light than it receives. Printed are the errors at measurements
 /// left out, a fifth at a time, and the directional albedo. The file holds the output weights and what
 /// draws the random layer again, with where the model comes from and how good it is.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// A file (.csv, MERL .binary, RGL .bsdf, pbrt-v2 .brdf), or 'curet:NAME'.
+    /// A file (.csv or another table, MERL .binary, RGL .bsdf, pbrt-v2 .brdf), - for standard input, or 'curet:NAME'.
     samples: String,
     /// The model's file: JSON for a name ending in .json, else binary.
     #[arg(short, long, value_name = "FILE")]

@@ -15,6 +15,26 @@ use super::{Failure, say};
 /// How many rows a formula or a table is looked up at unless said otherwise.
 const ROWS: usize = 20_000;
 
+/// Angles of a table, by the names that --angle knows.
+const ANGLES: [&str; 4] = ["theta_i", "phi_i", "theta_o", "phi_o"];
+
+/// The place of an angle among [`ANGLES`], and its value.
+fn angle(text: &str) -> Result<(usize, f64), String> {
+    let expected = || {
+        format!(
+            "expected one of {} and a number, such as theta_i=30",
+            ANGLES.join(", ")
+        )
+    };
+    let (name, number) = text.split_once('=').ok_or_else(expected)?;
+    let place = ANGLES.iter().position(|angle| *angle == name.trim());
+    let number: f64 = number.trim().parse().map_err(|_| expected())?;
+    match place {
+        Some(place) if number.is_finite() => Ok((place, number)),
+        _ => Err(expected()),
+    }
+}
+
 /// What the samples themselves do not say.
 #[derive(Debug, Args)]
 pub(super) struct Reading {
@@ -31,6 +51,14 @@ pub(super) struct Reading {
           default_missing_value = "theta_i",
           value_parser = PossibleValuesParser::new(["theta_i", "theta_o"]))]
     cosine_weighted: Option<String>,
+    /// An angle that is the same in every row of a table and so no column of it: theta_i=30, in the
+    /// unit of the file. For several angles, several times.
+    #[arg(long = "angle", value_name = "NAME=NUMBER", value_parser = angle)]
+    angles: Vec<(usize, f64)>,
+    /// Values of a table are reflectance factors, BRDF times pi. Columns named BRF are taken for these
+    /// without being told.
+    #[arg(long)]
+    reflectance_factor: bool,
     /// The channels to take, in this order: columns of a CSV file, colours or wavelengths, with
     /// commas between. All columns that can be reflectance if not given.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
@@ -115,6 +143,8 @@ impl Reading {
                 channels: self.channels.clone(),
                 ignore: self.ignore.clone(),
                 scatter_cosine: self.cosine_weighted.as_deref() == Some("theta_o"),
+                angles: self.constant_angles()?,
+                reflectance_factor: self.reflectance_factor,
             },
             sampling: Sampling::Random {
                 rows: self.rows,
@@ -128,9 +158,22 @@ impl Reading {
         for note in &opened.notes {
             say(&format!("note: {}: {note}", path.display()));
         }
-        let stem = path.file_stem().unwrap_or(path.as_os_str());
+        // 'paint' of paint.csv.gz.
+        let stem = |path: &Path| path.file_stem().unwrap_or(path.as_os_str()).to_owned();
+        let is_compressed = path
+            .extension()
+            .is_some_and(|end| end.eq_ignore_ascii_case("gz"));
+        let stem = if is_compressed {
+            stem(Path::new(&stem(path)))
+        } else {
+            stem(path)
+        };
         let material = Material {
-            name: stem.to_string_lossy().into_owned(),
+            name: if name == "-" {
+                "measurements".to_owned()
+            } else {
+                stem.to_string_lossy().into_owned()
+            },
             id: None,
             source: format!("{} ({})", path.display(), opened.format),
             synthetic: false,
@@ -150,12 +193,27 @@ impl Reading {
         Ok(material)
     }
 
+    /// The angles given for all rows.
+    fn constant_angles(&self) -> Result<[Option<f64>; 4], Failure> {
+        let mut angles = [None; 4];
+        for &(place, value) in &self.angles {
+            if angles[place].replace(value).is_some() {
+                let name = ANGLES[place];
+                return Err(Failure::Usage(format!("--angle {name} is given twice")));
+            }
+        }
+        Ok(angles)
+    }
+
     /// The files that [`read`](Self::read) reads for `name`.
     pub(super) fn inputs(&self, name: &str) -> Vec<PathBuf> {
         if name.starts_with("curet:") {
             return Source::find(self.data.as_deref()).map_or_else(|_| Vec::new(), |s| s.files());
         }
         if name.starts_with("synthetic:") {
+            return Vec::new();
+        }
+        if name == "-" {
             return Vec::new();
         }
         vec![name.into()]

@@ -62,10 +62,10 @@ use problem::Problem;
 /// **In between** both are done, and the one that is better at rows left out is taken.
 ///
 /// Rows are weighted by what the metric makes of an error, and the error that single precision would make
-/// counts in the choice of the strength. A network whose [albedo](crate::albedo) is physical, at no angle above
-/// 1 unless that of the nearest measurements is, is taken before any other. Noise of dark values is
-/// accounted for: the link's offset is at least three of its standard deviations, and where RMSE is asked
-/// for the fit is of the mean value, not of the value of the mean target.
+/// counts in the choice of the strength. A network whose [albedo](crate::albedo) is physical, at no
+/// angle above 1 unless that of the nearest measurements is, is taken before any other. Noise of dark
+/// values is accounted for: the link's offset is at least three of its standard deviations, and where
+/// RMSE is asked for the fit is of the mean value, not of the value of the mean target.
 ///
 /// **Size**, unless it is given: at most 213 neurons, which for three channels is 675 stored numbers; no more
 /// numbers than were measured, and of more than 1,000 at most half as many, but always

@@ -54,10 +54,15 @@ impl fmt::Display for List {
 pub enum Problem {
     /// Neither set of direction columns is complete.
     #[error(
-        "expected the columns {}, or {}; missing {}",
+        "expected the columns {}, or {}; missing {}{}",
         ANGLES.join(", "),
         VECTORS.join(", "),
-        missing.join(", ")
+        missing.join(", "),
+        if missing.iter().all(|name| ANGLES.contains(name)) {
+            format!(" (an angle that is the same in every row can be given as --angle {}=NUMBER)", missing[0])
+        } else {
+            String::new()
+        }
     )]
     NoDirections {
         /// The columns missing of the set that is more nearly complete.
@@ -66,6 +71,41 @@ pub enum Problem {
     /// Columns of both sets.
     #[error("expected directions as angles or as vectors, found columns of both")]
     BothDirections,
+    /// Two columns of one angle.
+    #[error("columns {first:?} and {second:?} are both {angle}; leave one out with --ignore")]
+    SameAngle {
+        /// Name of the angle.
+        angle: &'static str,
+        /// The columns' names, shortened if long.
+        first: String,
+        /// The other's.
+        second: String,
+    },
+    /// A column of which it cannot be told whether it is of the light or of the viewer.
+    #[error(
+        "column {column:?} may be of the light or of the viewer; name the columns {}",
+        ANGLES.join(", ")
+    )]
+    WhichSide {
+        /// The column's name, shortened if long.
+        column: String,
+    },
+    /// An angle given for all rows that is a column, too.
+    #[error("{angle} is given for all rows, and the table has the column {column:?}")]
+    AngleTwice {
+        /// Name of the angle.
+        angle: &'static str,
+        /// The column's name, shortened if long.
+        column: String,
+    },
+    /// Angles in different units, or in another than was asked for.
+    #[error("the columns' names say {said}: {advice}")]
+    Units {
+        /// What the names say.
+        said: &'static str,
+        /// What to do.
+        advice: &'static str,
+    },
     /// No column is left for the values.
     #[error("expected a column of values beside those of the directions")]
     NoValues,

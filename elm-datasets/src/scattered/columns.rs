@@ -1,15 +1,24 @@
 //! Which columns of a table are directions, which are reflectance, and which are neither.
 
-use super::{Columns, is_direction};
+use super::names::{self, Direction, Named, Side};
+use super::{Columns, Note};
 use crate::channel::{self, Kind};
-use crate::error::scattered::{ANGLES, List, Problem, VECTORS};
+use crate::error::scattered::{ANGLES, AngleUnit, List, Problem, VECTORS};
 use crate::text::shorten;
 
 /// Where the directions stand.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Directions {
-    Angles([usize; 4]),
+    Angles([Angle; 4]),
     Vectors([usize; 6]),
+}
+
+/// Where an angle is.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Angle {
+    Column(usize),
+    /// In every row the same, in the unit of the file.
+    Constant(f64),
 }
 
 /// What each column is for.
@@ -22,12 +31,18 @@ pub(super) struct Plan {
     pub(super) wavelength: Option<usize>,
     /// Columns left out, though nobody said so.
     pub(super) left_out: Vec<usize>,
+    /// The unit that the columns' names say.
+    pub(super) unit: Option<AngleUnit>,
+    /// What was assumed of the names.
+    pub(super) notes: Vec<Note>,
 }
 
 impl Directions {
     pub(super) fn contains(&self, column: usize) -> bool {
         match self {
-            Self::Angles(places) => places.contains(&column),
+            Self::Angles(angles) => angles
+                .iter()
+                .any(|angle| matches!(angle, Angle::Column(place) if *place == column)),
             Self::Vectors(places) => places.contains(&column),
         }
     }
@@ -35,14 +50,22 @@ impl Directions {
 
 impl Plan {
     pub(super) fn new(names: &[String], choice: &Columns) -> Result<Self, Problem> {
-        let directions = find_directions(names)?;
+        let ignored = |name: &String| {
+            let mut ignore = choice.ignore.iter();
+            ignore.any(|other| other.trim().eq_ignore_ascii_case(name.trim()))
+        };
+        let named: Vec<Option<Named>> = names
+            .iter()
+            .map(|name| names::of(name).filter(|_| !ignored(name)))
+            .collect();
+        let Found {
+            directions,
+            unit,
+            notes,
+        } = find_directions(names, &named, choice)?;
         let mut rest: Vec<usize> = (0..names.len())
             .filter(|&column| !directions.contains(column))
             .collect();
-        // Two spellings of one name would leave an angle among the values.
-        if rest.iter().any(|&column| is_direction(&names[column])) {
-            return Err(Problem::BothDirections);
-        }
         for name in &choice.ignore {
             let Some(column) = find(name, names, &rest) else {
                 return Err(unknown(name, names, &rest));
@@ -88,28 +111,195 @@ impl Plan {
             channels,
             wavelength,
             left_out,
+            unit,
+            notes,
         })
     }
 }
 
-fn find_directions(names: &[String]) -> Result<Directions, Problem> {
-    let place = |name: &&str| names.iter().position(|c| c.eq_ignore_ascii_case(name));
-    let (angles, vectors) = (ANGLES.map(|n| place(&n)), VECTORS.map(|n| place(&n)));
-    let some = |places: &[Option<usize>]| places.iter().any(Option::is_some);
-    if some(&angles) && some(&vectors) {
+/// Where directions were found, and what their names say.
+struct Found {
+    directions: Directions,
+    unit: Option<AngleUnit>,
+    notes: Vec<Note>,
+}
+
+fn find_directions(
+    names: &[String],
+    named: &[Option<Named>],
+    choice: &Columns,
+) -> Result<Found, Problem> {
+    let is_component = |named: &Option<Named>| matches!(named, Some((Direction::Component(_), _)));
+    let components = named.iter().filter(|named| is_component(named)).count();
+    let angles = named.iter().flatten().count() - components;
+    // An azimuth without a side may be anything beside vectors.
+    let sides = named
+        .iter()
+        .flatten()
+        .filter(|(direction, _)| matches!(direction, Direction::Theta(_) | Direction::Phi(_)));
+    if components > 0 && (sides.count() > 0 || choice.angles.iter().any(Option::is_some)) {
         return Err(Problem::BothDirections);
     }
-    match (all(angles), all(vectors)) {
-        (Some(places), _) => Ok(Directions::Angles(places)),
-        (_, Some(places)) => Ok(Directions::Vectors(places)),
-        _ => {
-            let set: &[&'static str] = if some(&vectors) { &VECTORS } else { &ANGLES };
-            let missing = set.iter().copied().filter(|name| place(name).is_none());
-            Err(Problem::NoDirections {
-                missing: missing.collect(),
-            })
+    if components == 0 && (angles > 0 || choice.angles.iter().any(Option::is_some)) {
+        return find_angles(names, named, choice);
+    }
+    let mut places = [None; 6];
+    for (column, named) in named.iter().enumerate() {
+        let Some((Direction::Component(place), _)) = named else {
+            continue;
+        };
+        // Two spellings of one name would leave a direction among the values.
+        if places[*place].replace(column).is_some() {
+            return Err(Problem::BothDirections);
         }
     }
+    let missing = |set: &[&'static str]| {
+        let missing = set.iter().zip(places.iter().chain([&None; 6]));
+        missing
+            .filter(|(_, place)| place.is_none())
+            .map(|(name, _)| *name)
+            .collect()
+    };
+    all(places).map_or_else(
+        || {
+            let set: &[&'static str] = if components > 0 { &VECTORS } else { &ANGLES };
+            Err(Problem::NoDirections {
+                missing: if components > 0 {
+                    missing(set)
+                } else {
+                    set.to_vec()
+                },
+            })
+        },
+        |places| {
+            Ok(Found {
+                directions: Directions::Vectors(places),
+                unit: None,
+                notes: Vec::new(),
+            })
+        },
+    )
+}
+
+fn find_angles(
+    names: &[String],
+    named: &[Option<Named>],
+    choice: &Columns,
+) -> Result<Found, Problem> {
+    let of = |side: Side| {
+        let is = move |named: &Named| matches!(named.0, Direction::Theta(other) | Direction::Phi(other) if other == side);
+        named.iter().flatten().any(is)
+    };
+    let scatter = match (of(Side::Light), of(Side::Viewer)) {
+        (true, false) => Some(Side::Viewer),
+        (false, true) => Some(Side::Light),
+        _ => None,
+    };
+    let mut places: [Option<usize>; 4] = [None; 4];
+    let mut difference = None;
+    for (column, found) in named.iter().enumerate() {
+        let Some((direction, _)) = found else {
+            continue;
+        };
+        let (first, side) = match direction {
+            Direction::Theta(side) => (0, *side),
+            Direction::Phi(side) => (1, *side),
+            Direction::Difference => {
+                difference = difference.or(Some(column));
+                continue;
+            }
+            Direction::Component(_) => continue,
+        };
+        let side = match side {
+            Side::ScatterOrSun => scatter.ok_or_else(|| Problem::WhichSide {
+                column: shorten(&names[column]),
+            })?,
+            side => side,
+        };
+        let place = first + if side == Side::Light { 0 } else { 2 };
+        if let Some(other) = places[place].replace(column) {
+            return Err(Problem::SameAngle {
+                angle: names::canonical(place),
+                first: shorten(&names[other]),
+                second: shorten(&names[column]),
+            });
+        }
+    }
+    let mut angles = [Angle::Constant(0.0); 4];
+    let (mut missing, mut no_azimuth) = (Vec::new(), Vec::new());
+    let mut notes = Vec::new();
+    for place in 0..4 {
+        let angle = names::canonical(place);
+        angles[place] = match (places[place], choice.angles[place]) {
+            (Some(column), Some(_)) => {
+                return Err(Problem::AngleTwice {
+                    angle,
+                    column: shorten(&names[column]),
+                });
+            }
+            (Some(column), None) => Angle::Column(column),
+            (None, Some(constant)) => Angle::Constant(constant),
+            (None, None) if place % 2 == 0 => {
+                missing.push(angle);
+                continue;
+            }
+            (None, None) => {
+                no_azimuth.push(place);
+                continue;
+            }
+        };
+    }
+    if !missing.is_empty() {
+        return Err(Problem::NoDirections { missing });
+    }
+    let mut others: Vec<String> = Vec::new();
+    for (place, column) in places.iter().enumerate() {
+        let Some(column) = *column else { continue };
+        let canonical = names::canonical(place);
+        if !names[column].trim().eq_ignore_ascii_case(canonical) {
+            others.push(format!("{} as {canonical}", shorten(&names[column])));
+        }
+    }
+    if !others.is_empty() {
+        notes.push(Note::Names {
+            columns: List::of(&others),
+        });
+    }
+    match difference {
+        Some(column) if no_azimuth == [1, 3] => {
+            angles[3] = Angle::Column(column);
+            notes.push(Note::Difference {
+                column: shorten(&names[column]),
+            });
+        }
+        _ if !no_azimuth.is_empty() => {
+            let absent = no_azimuth
+                .iter()
+                .map(|&place| names::canonical(place).to_owned());
+            let absent: Vec<String> = absent.collect();
+            notes.push(Note::NoAzimuth {
+                angles: List::of(&absent),
+            });
+        }
+        _ => {}
+    }
+    let used = angles.iter().filter_map(|angle| match angle {
+        Angle::Column(column) => named[*column].and_then(|(_, unit)| unit),
+        Angle::Constant(_) => None,
+    });
+    let units: Vec<AngleUnit> = used.collect();
+    let unit = units.first().copied();
+    if units.iter().any(|&other| Some(other) != unit) {
+        return Err(Problem::Units {
+            said: "degrees and radians",
+            advice: "all angles must be in one unit",
+        });
+    }
+    Ok(Found {
+        directions: Directions::Angles(angles),
+        unit,
+        notes,
+    })
 }
 
 fn all<const N: usize>(places: [Option<usize>; N]) -> Option<[usize; N]> {

@@ -35,6 +35,42 @@ pub enum Note {
         /// The largest azimuth.
         phi: f64,
     },
+    /// A table that is not separated by commas.
+    Separated {
+        /// What separates its cells.
+        separator: &'static str,
+        /// Whether numbers have commas for points.
+        decimal_commas: bool,
+    },
+    /// Comments, and lines before the names of the columns.
+    Comments {
+        /// How many lines.
+        lines: usize,
+    },
+    /// Columns of angles by other names.
+    Names {
+        /// What the names are taken for.
+        columns: List,
+    },
+    /// A unit that the file says.
+    Unit {
+        /// The unit.
+        unit: AngleUnit,
+        /// Where it says so.
+        place: &'static str,
+    },
+    /// Azimuths of which there is only the difference.
+    Difference {
+        /// Name of the column.
+        column: String,
+    },
+    /// Azimuths that are not there.
+    NoAzimuth {
+        /// Their names.
+        angles: List,
+    },
+    /// Reflectance factors.
+    ReflectanceFactors,
     /// Columns that are no channels.
     LeftOut {
         /// Their names.
@@ -81,6 +117,36 @@ impl fmt::Display for Note {
                 f,
                 "azimuths go up to {phi} radians: if the angles are degrees, say --degrees"
             ),
+            Self::Separated {
+                separator,
+                decimal_commas,
+            } => {
+                write!(f, "cells are separated by {separator}")?;
+                if *decimal_commas {
+                    f.write_str(", and numbers have commas for points")?;
+                }
+                Ok(())
+            }
+            Self::Comments { lines } => write!(f, "{lines} lines of comments were passed over"),
+            Self::Names { columns } => write!(f, "columns taken as angles: {columns}"),
+            Self::Unit { unit, place } => write!(
+                f,
+                "angles are in {}, as {place}",
+                match unit {
+                    AngleUnit::Radians => "radians",
+                    AngleUnit::Degrees => "degrees",
+                }
+            ),
+            Self::Difference { column } => write!(
+                f,
+                "{column} is taken as phi_o - phi_i: 0 where the viewer is on the light's side"
+            ),
+            Self::NoAzimuth { angles } => {
+                write!(f, "no column of {angles}: taken as 0 in every row")
+            }
+            Self::ReflectanceFactors => {
+                f.write_str("values are reflectance factors: divided by pi")
+            }
             Self::LeftOut { columns } => write!(f, "columns left out: {columns}"),
             Self::Pivoted {
                 rows,

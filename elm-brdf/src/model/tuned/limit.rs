@@ -312,8 +312,8 @@ impl Rows {
 }
 
 impl Rows {
-    /// The setting with the largest noise whose evidence is as good: where noise is as large as values are, the
-    /// difference between a slope and none is often luck.
+    /// The setting with the largest noise whose evidence is as good: where noise is as large as values
+    /// are, the difference between a slope and none is often luck.
     pub(super) fn calmest(&self, setting: &Setting) -> Result<Setting> {
         let of = |noise: f64| self.evidence(setting.smoothness, &setting.scales, noise);
         let mut calmest = setting.clone();
