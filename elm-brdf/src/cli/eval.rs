@@ -19,7 +19,8 @@ use elm_datasets::Brdf;
 pub(super) struct Arguments {
     /// A file that 'fit' has written.
     model: PathBuf,
-    /// A file (.csv or another table, MERL .binary, RGL .bsdf, pbrt-v2 .brdf), - for standard input, or 'curet:NAME'.
+    /// A file (.csv or another table, MERL .binary, RGL .bsdf, pbrt-v2 .brdf), - for standard input,
+    /// or 'curet:NAME'.
     samples: String,
     /// Form of the output.
     #[arg(long, value_name = "FORM", default_value = "table",

@@ -26,7 +26,8 @@ use crate::quality;
 /// draws the random layer again, with where the model comes from and how good it is.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// A file (.csv or another table, MERL .binary, RGL .bsdf, pbrt-v2 .brdf), - for standard input, or 'curet:NAME'.
+    /// A file (.csv or another table, MERL .binary, RGL .bsdf, pbrt-v2 .brdf), - for standard input,
+    /// or 'curet:NAME'.
     samples: String,
     /// The model's file: JSON for a name ending in .json, else binary.
     #[arg(short, long, value_name = "FILE")]
