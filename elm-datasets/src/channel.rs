@@ -297,6 +297,23 @@ pub(crate) fn is_reflectance_factor(name: &str) -> bool {
     ["brf", "hdrf", "hcrf"].into_iter().any(has) || has("reflectance") && has("factor")
 }
 
+/// The name of what a column of reflectance factors holds once it is divided by pi: `brdf 550 nm` of
+/// `BRF 550 nm`.
+pub(crate) fn without_factor(name: &str) -> String {
+    let lower = name.trim().to_lowercase();
+    for word in ["hdrf", "hcrf", "brf"] {
+        if lower.contains(word) {
+            return lower.replace(word, "brdf");
+        }
+    }
+    match (lower.find("reflectance"), lower.rfind("factor")) {
+        (Some(first), Some(last)) if first < last => {
+            format!("{}brdf{}", &lower[..first], &lower[last + "factor".len()..])
+        }
+        _ => "brdf".to_owned(),
+    }
+}
+
 /// Whether a name is a single word, and one that says something else than reflectance.
 pub(crate) fn is_one_word_for_something_else(name: &str) -> bool {
     match words(name).as_slice() {

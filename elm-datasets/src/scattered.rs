@@ -208,9 +208,25 @@ fn parse(
     })?;
     notes.extend(more);
     let mut channels = plan.channels.iter();
-    if choice.reflectance_factor
-        || channels.all(|&column| channel::is_reflectance_factor(&names[column]))
-    {
+    let named = channels.all(|&column| channel::is_reflectance_factor(&names[column]));
+    if named {
+        // Read again, they must not be divided again.
+        let mut renamed: Vec<String> = Vec::with_capacity(samples.channels.len());
+        for name in &samples.channels {
+            let name = channel::without_factor(name);
+            let same = renamed
+                .iter()
+                .filter(|other| other.starts_with(&name))
+                .count();
+            renamed.push(if same > 0 {
+                format!("{name} ({})", same + 1)
+            } else {
+                name
+            });
+        }
+        samples.channels = renamed;
+    }
+    if named || choice.reflectance_factor {
         samples.values /= std::f64::consts::PI;
         notes.push(Note::ReflectanceFactors);
     }

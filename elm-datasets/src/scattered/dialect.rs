@@ -35,18 +35,20 @@ pub(super) enum Separator {
 }
 
 impl Separator {
-    /// What separates the words of a header.
+    /// What separates the words of a header: that by which most of them name directions.
     fn of(header: &str) -> Self {
-        let has = |c| header.contains(c);
-        if has(';') {
-            Self::Semicolon
-        } else if has('\t') {
-            Self::Tab
-        } else if has(',') || header.split_whitespace().count() < 2 {
-            Self::Comma
-        } else {
-            Self::Blanks
-        }
+        let named = |separator: &Self| {
+            let cells = separator.cells(header);
+            cells
+                .iter()
+                .filter(|cell| names::of(cell).is_some())
+                .count()
+        };
+        // Of equals the last is taken, a comma before all.
+        [Self::Blanks, Self::Tab, Self::Semicolon, Self::Comma]
+            .into_iter()
+            .max_by_key(named)
+            .unwrap_or(Self::Comma)
     }
 
     pub(super) fn name(self) -> &'static str {
@@ -86,8 +88,11 @@ fn comment(line: &str) -> Option<&str> {
 /// Whether a line names directions: two columns of them, or one and another column.
 pub(super) fn is_header(line: &str) -> bool {
     let cells = Separator::of(line).cells(line);
-    let named = cells.iter().filter(|cell| names::of(cell).is_some());
-    named.count() >= 2
+    cells
+        .iter()
+        .filter(|cell| names::of(cell).is_some())
+        .count()
+        >= 2
 }
 
 /// The unit that words say, where they say one.
@@ -126,6 +131,7 @@ impl Text {
             decimal_commas: false,
         };
         let mut said = String::new();
+        let mut quoted = false;
         let mut at = start;
         for line in text[start..].split_inclusive('\n') {
             let content = line.trim_end_matches(['\r', '\n']);
@@ -135,8 +141,8 @@ impl Text {
                 if let Some(rest) = comment(content) {
                     out.bytes[at..end - rest.len()].fill(b' ');
                 }
-                out.separate(at..end);
-            } else if at < start + header.start || comment(content).is_some() {
+                quoted = out.separate(at..end, quoted);
+            } else if at < start + header.start || !quoted && comment(content).is_some() {
                 if !content.trim().is_empty() {
                     out.comments += 1;
                     said.push_str(content);
@@ -145,7 +151,7 @@ impl Text {
                 // Lines without anything, which a table may have.
                 out.bytes[at..end].fill(b'\r');
             } else {
-                out.separate(at..end);
+                quoted = out.separate(at..end, quoted);
             }
             at += line.len();
         }
@@ -153,13 +159,17 @@ impl Text {
         Some(out)
     }
 
-    /// Puts commas between the cells of a line, and points into its numbers.
-    fn separate(&mut self, range: std::ops::Range<usize>) {
+    /// Puts commas between the cells of a line, and points into its numbers. Whether the line begins, and
+    /// ends, within quotes is given and returned.
+    fn separate(&mut self, range: std::ops::Range<usize>, mut quoted: bool) -> bool {
         if self.separator == Separator::Comma {
-            return;
+            let quotes = self.bytes[range]
+                .iter()
+                .filter(|&&byte| byte == b'"')
+                .count();
+            return quoted != (quotes % 2 == 1);
         }
         let mut line = self.bytes[range.clone()].to_vec();
-        let mut quoted = false;
         let mut cell = 0;
         for at in 0..=line.len() {
             let byte = line.get(at).copied();
@@ -185,6 +195,7 @@ impl Text {
             }
         }
         self.bytes[range].copy_from_slice(&line);
+        quoted
     }
 }
 

@@ -70,9 +70,18 @@ pub(super) const SCATTERED: Reader = Reader {
                 "bad-horizon.csv",
                 "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z,y\n0,0,-1,0,0,1,2\n",
             ),
+            seed("bad-columns.csv", "theta_i,phi_i,phi_o,y\n0.1,0.2,0.3,1\n"),
             seed(
-                "bad-columns.csv",
-                "theta_i,phi_i,theta_o,y\n0.1,0.2,0.3,1\n",
+                "semicolons.csv",
+                "# angles in deg\n\nthi;phi_in;Theta_s;phi_s;\"a;b\"\n0,1;0;2e-1;1;0,5\n# more\n0;0;0;0;1\n",
+            ),
+            seed(
+                "tabs.tsv",
+                "SZA\tVZA\tRAA (rad)\tBRF 550 nm\tBRF 650 nm\n0.1\t0.2\t3\t0.4\t0.5\n",
+            ),
+            seed(
+                "blanks.txt",
+                "made by hand\n% theta_i  theta_o dphi reflectance_factor\n 0.1 0.2   3  0.5 \n",
             ),
         ]
     },
