@@ -155,8 +155,9 @@ impl Reading {
         };
         let path = Path::new(name);
         let opened = open(path, &options)?;
+        let shown = if name == "-" { "standard input" } else { name };
         for note in &opened.notes {
-            say(&format!("note: {}: {note}", path.display()));
+            say(&format!("note: {shown}: {note}"));
         }
         // 'paint' of paint.csv.gz.
         let stem = |path: &Path| path.file_stem().unwrap_or(path.as_os_str()).to_owned();
@@ -175,7 +176,7 @@ impl Reading {
                 stem.to_string_lossy().into_owned()
             },
             id: None,
-            source: format!("{} ({})", path.display(), opened.format),
+            source: format!("{shown} ({})", opened.format),
             synthetic: false,
             samples: opened.samples,
             invalid: opened.invalid,
@@ -184,11 +185,7 @@ impl Reading {
             left_out: opened.left_out,
         };
         if material.missing > 0 {
-            say(&format!(
-                "note: {}: {}",
-                path.display(),
-                material.counts(self.invalid)
-            ));
+            say(&format!("note: {shown}: {}", material.counts(self.invalid)));
         }
         Ok(material)
     }
