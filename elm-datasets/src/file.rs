@@ -9,7 +9,7 @@ use flate2::read::MultiGzDecoder;
 use crate::error::{Error, MAX_FILE_BYTES};
 
 /// The path that means standard input.
-pub(crate) const STANDARD_INPUT: &str = "-";
+pub const STANDARD_INPUT: &str = "-";
 
 /// What every file compressed by gzip begins with.
 const GZIP: [u8; 2] = [0x1f, 0x8b];

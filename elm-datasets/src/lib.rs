@@ -59,10 +59,11 @@ pub mod toy;
 
 pub use brdf::Brdf;
 pub use error::Error;
+pub use file::STANDARD_INPUT;
 pub use geometry::{Angles, DirectionPair};
 pub use material_id::MaterialId;
 pub use measurements::{Invalid, Material, Measurements, Origin, fill_values};
-pub use open::{Format, OpenOptions, Opened, open};
+pub use open::{Format, OpenOptions, Opened, open, uncompressed};
 pub use samples::Samples;
 pub use sampling::Sampling;
 

@@ -1,7 +1,7 @@
 //! Reads samples from a file of any format that this crate knows.
 
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use ndarray::Axis;
@@ -69,14 +69,8 @@ impl Format {
                 what,
             });
         }
-        let end = |path: &Path| path.extension().unwrap_or_default().to_owned();
-        let compressed = end(path).eq_ignore_ascii_case("gz");
-        let end = if compressed {
-            path.file_stem()
-                .map_or_else(Default::default, |stem| end(Path::new(stem)))
-        } else {
-            end(path)
-        };
+        let inner = uncompressed(path);
+        let end = inner.extension().unwrap_or_default();
         [
             ("csv", Self::Scattered),
             ("tsv", Self::Scattered),
@@ -91,6 +85,20 @@ impl Format {
         .ok_or_else(|| Error::UnknownFormat {
             path: path.to_owned(),
         })
+    }
+}
+
+/// The name of what is in a file: without the `.gz` of one compressed by gzip.
+///
+/// ```
+/// use std::path::Path;
+/// assert_eq!(elm_datasets::uncompressed(Path::new("a/paint.csv.gz")), Path::new("a/paint.csv"));
+/// ```
+#[must_use]
+pub fn uncompressed(path: &Path) -> PathBuf {
+    match path.extension() {
+        Some(end) if end.eq_ignore_ascii_case("gz") => path.with_extension(""),
+        _ => path.to_owned(),
     }
 }
 

@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use elm_datasets::scattered::{self, AngleUnit};
-use elm_datasets::{Invalid, MaterialId, OpenOptions, Samples, Sampling, open, paint};
+use elm_datasets::scattered::{self, ANGLES, AngleUnit};
+use elm_datasets::{
+    Invalid, MaterialId, OpenOptions, STANDARD_INPUT, Samples, Sampling, open, paint, uncompressed,
+};
 
 use super::common::one_of;
 use super::data::Source;
@@ -14,9 +16,6 @@ use super::{Failure, say};
 
 /// How many rows a formula or a table is looked up at unless said otherwise.
 const ROWS: usize = 20_000;
-
-/// Angles of a table, by the names that --angle knows.
-const ANGLES: [&str; 4] = ["theta_i", "phi_i", "theta_o", "phi_o"];
 
 /// The place of an angle among [`ANGLES`], and its value.
 fn angle(text: &str) -> Result<(usize, f64), String> {
@@ -155,23 +154,16 @@ impl Reading {
         };
         let path = Path::new(name);
         let opened = open(path, &options)?;
-        let shown = if name == "-" { "standard input" } else { name };
+        let piped = name == STANDARD_INPUT;
+        let shown = if piped { "standard input" } else { name };
         for note in &opened.notes {
             say(&format!("note: {shown}: {note}"));
         }
-        // 'paint' of paint.csv.gz.
-        let stem = |path: &Path| path.file_stem().unwrap_or(path.as_os_str()).to_owned();
-        let is_compressed = path
-            .extension()
-            .is_some_and(|end| end.eq_ignore_ascii_case("gz"));
-        let stem = if is_compressed {
-            stem(Path::new(&stem(path)))
-        } else {
-            stem(path)
-        };
+        let inner = uncompressed(path);
+        let stem = inner.file_stem().unwrap_or(inner.as_os_str());
         let material = Material {
-            name: if name == "-" {
-                "measurements".to_owned()
+            name: if piped {
+                "measurements".into()
             } else {
                 stem.to_string_lossy().into_owned()
             },
@@ -210,7 +202,7 @@ impl Reading {
         if name.starts_with("synthetic:") {
             return Vec::new();
         }
-        if name == "-" {
+        if name == STANDARD_INPUT {
             return Vec::new();
         }
         vec![name.into()]

@@ -59,7 +59,8 @@ use problem::Problem;
 /// rows left out, five folds in turn. Where nothing was measured the nearest measurements pull weakly, so
 /// that the network is tame there.
 ///
-/// **In between** both are done, and the one that is better at rows left out is taken.
+/// **In between** both are done. The second is taken where its error at rows left out is at most 0.8 times
+/// that of the first, which is tamer between them, or where noise is as large as values are.
 ///
 /// Rows are weighted by what the metric makes of an error, and the error that single precision would make
 /// counts in the choice of the strength. A network whose [albedo](crate::albedo) is physical, at no
@@ -134,7 +135,7 @@ impl Tuned {
     /// For fewer: one that tells light from viewer and two reciprocal ones, of which one spreads out
     /// highlights and the other what returns to the light. The evidence of few measurements tells these
     /// apart; of others, chosen on part of the directions, it did not say how they go on beyond
-    /// (docs/reports/accuracy.md).
+    /// (docs/decisions/0016-few-measurements-by-the-limit.md).
     const FEW_SETS: [Features; 3] = [Features::Cosines, Features::Highlight, Features::HalfDiff];
     /// Neurons that measurements always warrant, if there are as many.
     const FEWEST: usize = 16;

@@ -5,7 +5,7 @@ use std::fmt;
 use crate::text::shorten;
 
 /// Columns of directions as angles.
-pub(crate) const ANGLES: [&str; 4] = ["theta_i", "phi_i", "theta_o", "phi_o"];
+pub const ANGLES: [&str; 4] = ["theta_i", "phi_i", "theta_o", "phi_o"];
 /// Columns of directions as unit vectors.
 pub(crate) const VECTORS: [&str; 6] = ["wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z"];
 

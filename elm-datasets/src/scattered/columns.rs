@@ -129,56 +129,47 @@ fn find_directions(
     named: &[Option<Named>],
     choice: &Columns,
 ) -> Result<Found, Problem> {
-    let is_component = |named: &Option<Named>| matches!(named, Some((Direction::Component(_), _)));
-    let components = named.iter().filter(|named| is_component(named)).count();
-    let angles = named.iter().flatten().count() - components;
+    let component = |named: &Option<Named>| match named {
+        Some((Direction::Component(place), _)) => Some(*place),
+        _ => None,
+    };
     // An azimuth without a side may be anything beside vectors.
-    let sides = named
-        .iter()
-        .flatten()
-        .filter(|(direction, _)| matches!(direction, Direction::Theta(_) | Direction::Phi(_)));
-    if components > 0 && (sides.count() > 0 || choice.angles.iter().any(Option::is_some)) {
-        return Err(Problem::BothDirections);
-    }
-    if components == 0 && (angles > 0 || choice.angles.iter().any(Option::is_some)) {
-        return find_angles(names, named, choice);
-    }
+    let has_side =
+        |(direction, _): &Named| matches!(direction, Direction::Theta(_) | Direction::Phi(_));
+    let given = choice.angles.iter().any(Option::is_some);
     let mut places = [None; 6];
     for (column, named) in named.iter().enumerate() {
-        let Some((Direction::Component(place), _)) = named else {
-            continue;
-        };
         // Two spellings of one name would leave a direction among the values.
-        if places[*place].replace(column).is_some() {
+        if let Some(place) = component(named)
+            && places[place].replace(column).is_some()
+        {
             return Err(Problem::BothDirections);
         }
     }
-    let missing = |set: &[&'static str]| {
-        let missing = set.iter().zip(places.iter().chain([&None; 6]));
-        missing
+    if places.iter().all(Option::is_none) {
+        if given || named.iter().any(Option::is_some) {
+            return find_angles(names, named, choice);
+        }
+        let missing = ANGLES.to_vec();
+        return Err(Problem::NoDirections { missing });
+    }
+    if given || named.iter().flatten().any(has_side) {
+        return Err(Problem::BothDirections);
+    }
+    let Some(places) = all(places) else {
+        let there = VECTORS.into_iter().zip(places);
+        let missing = there
             .filter(|(_, place)| place.is_none())
-            .map(|(name, _)| *name)
-            .collect()
+            .map(|(name, _)| name);
+        return Err(Problem::NoDirections {
+            missing: missing.collect(),
+        });
     };
-    all(places).map_or_else(
-        || {
-            let set: &[&'static str] = if components > 0 { &VECTORS } else { &ANGLES };
-            Err(Problem::NoDirections {
-                missing: if components > 0 {
-                    missing(set)
-                } else {
-                    set.to_vec()
-                },
-            })
-        },
-        |places| {
-            Ok(Found {
-                directions: Directions::Vectors(places),
-                unit: None,
-                notes: Vec::new(),
-            })
-        },
-    )
+    Ok(Found {
+        directions: Directions::Vectors(places),
+        unit: None,
+        notes: Vec::new(),
+    })
 }
 
 fn find_angles(
@@ -219,7 +210,7 @@ fn find_angles(
         let place = first + if side == Side::Light { 0 } else { 2 };
         if let Some(other) = places[place].replace(column) {
             return Err(Problem::SameAngle {
-                angle: names::canonical(place),
+                angle: ANGLES[place],
                 first: shorten(&names[other]),
                 second: shorten(&names[column]),
             });
@@ -229,7 +220,7 @@ fn find_angles(
     let (mut missing, mut no_azimuth) = (Vec::new(), Vec::new());
     let mut notes = Vec::new();
     for place in 0..4 {
-        let angle = names::canonical(place);
+        let angle = ANGLES[place];
         angles[place] = match (places[place], choice.angles[place]) {
             (Some(column), Some(_)) => {
                 return Err(Problem::AngleTwice {
@@ -255,7 +246,7 @@ fn find_angles(
     let mut others: Vec<String> = Vec::new();
     for (place, column) in places.iter().enumerate() {
         let Some(column) = *column else { continue };
-        let canonical = names::canonical(place);
+        let canonical = ANGLES[place];
         if !names[column].trim().eq_ignore_ascii_case(canonical) {
             others.push(format!("{} as {canonical}", shorten(&names[column])));
         }
@@ -273,9 +264,7 @@ fn find_angles(
             });
         }
         _ if !no_azimuth.is_empty() => {
-            let absent = no_azimuth
-                .iter()
-                .map(|&place| names::canonical(place).to_owned());
+            let absent = no_azimuth.iter().map(|&place| ANGLES[place].to_owned());
             let absent: Vec<String> = absent.collect();
             notes.push(Note::NoAzimuth {
                 angles: List::of(&absent),

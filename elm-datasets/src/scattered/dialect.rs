@@ -85,7 +85,7 @@ fn comment(line: &str) -> Option<&str> {
     MARKS.iter().find_map(|mark| line.strip_prefix(mark))
 }
 
-/// Whether a line names directions: two columns of them, or one and another column.
+/// Whether at least two columns of a line name directions.
 pub(super) fn is_header(line: &str) -> bool {
     let cells = Separator::of(line).cells(line);
     cells
@@ -114,7 +114,7 @@ fn unit_of(text: &str) -> Option<AngleUnit> {
 }
 
 impl Text {
-    /// `None` for bytes that need no rewriting: a comma-separated table without comments, or no text.
+    /// `None` for bytes that need no rewriting: a table with commas and without comments, or no text.
     pub(super) fn of(bytes: &[u8]) -> Option<Self> {
         let text = std::str::from_utf8(bytes).ok()?;
         let start = text
@@ -123,6 +123,13 @@ impl Text {
         let header = header(&text[start..])?;
         let named = &text[start..][header.clone()];
         let separator = Separator::of(comment(named).unwrap_or(named));
+        let around = [&text[start..][..header.start], &text[start..][header.end..]];
+        let commented = comment(named).is_some()
+            || !around[0].trim().is_empty()
+            || around[1].lines().any(|line| comment(line).is_some());
+        if separator == Separator::Comma && !commented {
+            return None;
+        }
         let mut out = Self {
             bytes: bytes.to_vec(),
             separator,

@@ -1,6 +1,6 @@
 //! What the name of a column says of a direction.
 
-use crate::error::scattered::{ANGLES, AngleUnit, VECTORS};
+use crate::error::scattered::{AngleUnit, VECTORS};
 
 /// Light or viewer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -176,11 +176,6 @@ fn side(word: &str) -> Option<Side> {
     } else {
         None
     }
-}
-
-/// The name that this project writes for an angle.
-pub(super) fn canonical(place: usize) -> &'static str {
-    ANGLES.get(place).copied().unwrap_or("?")
 }
 
 #[cfg(test)]
