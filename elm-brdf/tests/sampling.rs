@@ -67,8 +67,9 @@ fn draws_follow_their_density(materials: &[(usize, Material)]) {
         for view in VIEWS {
             let found = testing::chi_square(material, cartesian(view, 0.3), &mut random);
             assert!(found.statistic < found.limit, "{id} at {view}: {found:?}");
+            // Midpoints at a tenth of the narrowest lobe's width.
             assert!(
-                (found.total - 1.0).abs() < 1e-9,
+                (found.total - 1.0).abs() < 2e-3,
                 "{id} at {view}: {found:?}"
             );
             assert!(found.density_error < 1e-6, "{id} at {view}: {found:?}");
@@ -91,7 +92,7 @@ fn albedos_agree(materials: &[(usize, Material)]) {
     let mut random = uniform(2);
     let (mut above, mut most): (Vec<usize>, f64) = (Vec::new(), 0.0);
     for (id, material) in materials {
-        for (theta_o, tabulated) in material.albedo() {
+        for (theta_o, albedo) in material.albedo() {
             let outgoing = cartesian(theta_o, 0.0);
             let found = testing::white_furnace(material, outgoing, &mut random).unwrap();
             let quadrature = found.quadrature;
@@ -101,10 +102,10 @@ fn albedos_agree(materials: &[(usize, Material)]) {
                 (found.sampled - quadrature).abs() <= tolerance,
                 "{id} at {theta_o}: {found:?}"
             );
-            // The table has 24 x 32 cells.
+            // As many draws as above, but of a sequence that fills the square evenly.
             assert!(
-                (tabulated - quadrature).abs() <= 0.03 * quadrature,
-                "{id} at {theta_o}: {tabulated} in the table, {quadrature}"
+                (albedo - quadrature).abs() <= tolerance,
+                "{id} at {theta_o}: {albedo}, {quadrature}"
             );
             most = most.max(quadrature);
         }
@@ -217,7 +218,7 @@ fn every_kind_of_reflectance_passes_chi_square_white_furnace_and_where_it_claims
             let outgoing = cartesian(view, 0.3);
             let fit = testing::chi_square(&material, outgoing, &mut random);
             assert!(fit.statistic < fit.limit, "{name} at {view}: {fit:?}");
-            assert!((fit.total - 1.0).abs() < 1e-9, "{name} at {view}: {fit:?}");
+            assert!((fit.total - 1.0).abs() < 2e-3, "{name} at {view}: {fit:?}");
             assert!(fit.density_error < 1e-6, "{name} at {view}: {fit:?}");
             let found = testing::white_furnace(&material, outgoing, &mut random).unwrap();
             let tolerance = 5.0 * found.standard_error + 0.01 * found.quadrature;
@@ -303,10 +304,11 @@ material = 'm'
     };
     let (as_it_is, rescaled) = (picture(""), picture("conserve_energy = true"));
     let [value, less] = [&as_it_is, &rescaled].map(|picture| picture.pixels[0][0]);
-    // Lambert's 1, and of what meets the highlight 0.92 (its directional albedo by an independent sum).
+    // Lambert's 1, and of what meets the highlight 0.916 (its directional albedo by an independent sum).
     assert!(value > 1.8, "{value}");
-    // By a table of albedos, the pixel by 4096 samples.
-    assert!((less - 1.0).abs() < 0.01, "{less}");
+    // At 87 degrees the highlight's directional albedo is 0.931, and the sum the largest. Half a percent for the
+    // draws of the material's albedo and the pixel's.
+    assert!((less - 1.916 / 1.931).abs() < 0.005, "{less}");
     let notes = [&as_it_is, &rescaled].map(|picture| picture.account.notes.join("\n"));
     for note in &notes {
         assert!(note.starts_with("material 'm' reflects up to "), "{note}");

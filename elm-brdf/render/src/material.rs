@@ -4,12 +4,12 @@
 use ndarray::ArrayViewMut2;
 
 use crate::error::{Error, Result};
-use crate::tabulated_sampler::{SampleGrid, TabulatedSampler};
+use crate::lobe_mixture::LobeMixture;
 use crate::vector::{Rgb, largest, luminance, scaled, times};
 use elm_datasets::Brdf;
 use elm_datasets::geometry::{DirectionPair, Vector};
 
-/// A model may pass the largest value of its [`SampleGrid`] by this factor; beyond, it is cut off.
+/// A model may pass the largest value of the directions asked by this factor; beyond, it is cut off.
 const CEILING_MARGIN: f64 = 2.0;
 
 /// A reflectance model ready for rendering.
@@ -36,8 +36,11 @@ pub struct Material {
     /// Factor on each channel.
     factor: Rgb,
     max_value: f64,
-    sampler: TabulatedSampler,
-    albedo: f64,
+    sampler: LobeMixture,
+    /// As luminance before any rescaling, by viewing angle.
+    albedo: Vec<(f64, f64)>,
+    /// Of any channel at any angle.
+    largest_albedo: f64,
     /// Factor that keeps the albedo from passing 1; 1 where that was not asked for or needed.
     scale: f64,
 }
@@ -57,33 +60,34 @@ impl Material {
         if !tint.iter().all(|c| (0.0..=1e6).contains(c)) {
             return Err(Error::Tint { found: tint });
         }
-        let grid = SampleGrid::new();
         let raw = |pairs: &[DirectionPair]| -> Result<Vec<Rgb>> {
             let mut room = Vec::new();
             evaluate(&*brdf, pairs, &mut room)?;
             let rows = room.chunks_exact(channels);
             Ok(rows.map(|row| colour(row, f64::INFINITY)).collect())
         };
-        let cells = raw(&grid.cells)?;
-        let highest = cells
+        let grey = |values: &[Rgb]| -> Vec<f64> {
+            let tinted = values.iter().map(|&value| times(value, tint));
+            tinted.map(luminance).collect()
+        };
+        let pilot = LobeMixture::pilot();
+        let first = raw(&pilot.pairs)?;
+        let sampler = LobeMixture::fit(&pilot, &grey(&first));
+        let points = sampler.points();
+        let values = raw(&points.pairs)?;
+        let highest = first
             .iter()
-            .chain(&raw(&grid.peaks)?)
+            .chain(&values)
+            .chain(&raw(&LobeMixture::peaks())?)
             .map(|&value| largest(value))
             .fold(0.0, f64::max);
-        let grey: Vec<f64> = cells
-            .iter()
-            .map(|&value| luminance(times(value, tint)))
-            .collect();
-        let sampler = TabulatedSampler::new(&grey);
+        let albedo = points.albedo(&grey(&values));
         let largest_albedo = (0..3)
-            .map(|channel| {
-                let values: Vec<f64> = cells.iter().map(|v| v[channel] * tint[channel]).collect();
-                let albedo = TabulatedSampler::new(&values);
-                albedo
-                    .albedo()
-                    .map(|(_, albedo)| albedo)
-                    .fold(0.0, f64::max)
+            .flat_map(|channel| {
+                let values: Vec<f64> = values.iter().map(|v| v[channel] * tint[channel]).collect();
+                points.albedo(&values)
             })
+            .map(|(_, albedo)| albedo)
             .fold(0.0, f64::max);
         let scale = if conserve_energy && largest_albedo > 1.0 {
             1.0 / largest_albedo
@@ -95,7 +99,8 @@ impl Material {
             factor: scaled(tint, scale),
             max_value: CEILING_MARGIN * highest,
             sampler,
-            albedo: largest_albedo,
+            albedo,
+            largest_albedo,
             scale,
         })
     }
@@ -126,8 +131,7 @@ impl Material {
     }
 
     /// Draws an incident direction for a viewer at `outgoing`, from two numbers in \[0, 1), with
-    /// its density in solid angle: about in proportion to the model times the cosine, mixed with
-    /// the cosine alone.
+    /// its density in solid angle: about in proportion to the model times the cosine.
     #[must_use]
     pub fn sample(&self, outgoing: Vector, u: [f64; 2]) -> (Vector, f64) {
         self.sampler.sample(outgoing, u)
@@ -143,15 +147,15 @@ impl Material {
     /// reflected, for each of some angles (theta_o, albedo).
     #[must_use]
     pub fn albedo(&self) -> Vec<(f64, f64)> {
-        let scaled = |(theta_o, albedo)| (theta_o, self.scale * albedo);
-        self.sampler.albedo().map(scaled).collect()
+        let scaled = |&(theta_o, albedo)| (theta_o, self.scale * albedo);
+        self.albedo.iter().map(scaled).collect()
     }
 
     /// The largest directional albedo of any channel before any rescaling; above 1 the model
     /// creates energy.
     #[must_use]
     pub fn largest_albedo(&self) -> f64 {
-        self.albedo
+        self.largest_albedo
     }
 
     /// Whether it was scaled down so that no albedo passes 1.
@@ -178,7 +182,7 @@ impl std::fmt::Debug for Material {
         f.debug_struct("Material")
             .field("channels", &self.channels())
             .field("ceiling", &self.max_value)
-            .field("albedo", &self.albedo)
+            .field("largest_albedo", &self.largest_albedo)
             .finish_non_exhaustive()
     }
 }

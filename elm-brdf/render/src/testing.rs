@@ -96,24 +96,29 @@ pub fn chi_square(
     }
 }
 
-/// The density's integral over a range of angles, by midpoints in the cosine and in phi: exact for
-/// the sampler's table, whose density is constant on each of these cells.
+/// The density's integral over a range of angles, by midpoints in the cosine and in phi, denser towards both
+/// ends in phi: the viewer's plane, where lobes are narrow at grazing angles, lies between two bins.
 fn integral(
     material: &Material,
     outgoing: Vector,
     thetas: (f64, f64),
     (phi, phi_end): (f64, f64),
 ) -> f64 {
-    const THETAS: usize = 4;
-    const PHIS: usize = 8;
+    const THETAS: usize = 32;
+    const PHIS: usize = 32;
+    let cosine = |t: usize| (thetas.0 + (thetas.1 - thetas.0) * t as f64 / THETAS as f64).cos();
+    let azimuth = |p: f64| {
+        let t = p / PHIS as f64;
+        phi + (phi_end - phi) * t * t * (3.0 - 2.0 * t)
+    };
     let mut sum = 0.0;
     for t in 0..THETAS {
-        let cosine = |t: usize| (thetas.0 + (thetas.1 - thetas.0) * t as f64 / THETAS as f64).cos();
         let (near, far) = (cosine(t), cosine(t + 1));
-        let step = (phi_end - phi) / PHIS as f64;
         for p in 0..PHIS {
-            let incident = cartesian(((near + far) / 2.0).acos(), phi + (p as f64 + 0.5) * step);
-            sum += material.pdf(outgoing, incident) * (near - far) * step;
+            let p = p as f64;
+            let incident = cartesian(((near + far) / 2.0).acos(), azimuth(p + 0.5));
+            let area = (near - far) * (azimuth(p + 1.0) - azimuth(p));
+            sum += material.pdf(outgoing, incident) * area;
         }
     }
     sum
