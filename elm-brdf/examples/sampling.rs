@@ -1,5 +1,6 @@
-//! How well materials are sampled: the relative variance of $f \cos\theta_i$ over the density of the renderer's
-//! sampler and of the cosine, the table of [docs/decisions/0017](../../../docs/decisions/0017-sampled-by-lobes.md).
+//! How well materials are sampled: the relative variance of $f \cos\theta_i$ over the density of the
+//! renderer's sampler and of the cosine, the table of
+//! [docs/decisions/0017-sampled-by-lobes.md](../../docs/decisions/0017-sampled-by-lobes.md).
 //!
 //! `cargo run --release -p elm-brdf --example sampling -- MODEL...`, models as `elm-brdf fit` writes them.
 
@@ -19,7 +20,8 @@ use rand_chacha::ChaCha8Rng;
 const VIEWS: [f64; 5] = [0.0, 20.0, 40.0, 60.0, 80.0];
 const DRAWS: usize = 100_000;
 
-/// Variance over the square of the mean, and the largest value over the mean, of the luminance of f cos / density.
+/// Variance over the square of the mean, and the largest value over the mean, of the luminance of f cos /
+/// density.
 fn spread(
     material: &Material,
     outgoing: Vector,

@@ -24,6 +24,9 @@ pub const ANGLES: [f64; 7] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0];
 const RADII: usize = 40;
 const TURNS: usize = 24;
 
+/// Azimuths of the light over half a turn, for models that are not isotropic.
+const AZIMUTHS: u32 = 4;
+
 /// A node of the quadrature: a pair of directions, and what the value there counts in the albedo.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Node {
@@ -76,8 +79,8 @@ pub(crate) fn nodes(theta: f64) -> Vec<Node> {
 
 /// The directional albedo of each channel for light from `theta` radians from the normal.
 ///
-/// For isotropic models. Of lobes wider than 2 degrees, narrower ones near grazing excepted, the
-/// quadrature is right to a per cent or so.
+/// Of a model that is not isotropic, the largest of four azimuths of the light. Of lobes wider than 2
+/// degrees, narrower ones near grazing excepted, the quadrature is right to a per cent or so.
 ///
 /// ```
 /// use elm_brdf::albedo;
@@ -91,9 +94,38 @@ pub(crate) fn nodes(theta: f64) -> Vec<Node> {
 /// # Errors
 /// Those of [`Brdf::eval`].
 pub fn directional(brdf: &dyn Brdf, theta: f64) -> Result<Vec<f64>> {
+    let at = |nodes: &[Node]| -> Result<Vec<f64>> {
+        let pairs: Vec<DirectionPair> = nodes.iter().map(|node| node.pair).collect();
+        Ok(sums(nodes, brdf.eval(&pairs)?.view()))
+    };
     let nodes = nodes(theta);
-    let pairs: Vec<DirectionPair> = nodes.iter().map(|node| node.pair).collect();
-    Ok(sums(&nodes, brdf.eval(&pairs)?.view()))
+    if brdf.is_isotropic() {
+        return at(&nodes);
+    }
+    let mut largest = vec![0.0_f64; brdf.channels()];
+    for turn in 0..AZIMUTHS {
+        let azimuth = PI * f64::from(turn) / f64::from(AZIMUTHS);
+        // Both halves, which are no longer the same.
+        let halves = [1.0, -1.0].map(|side| {
+            let turned = nodes.iter().map(|node| {
+                let [x, y, z] = node.pair.outgoing;
+                let outgoing = [x, side * y, z];
+                Node {
+                    pair: DirectionPair {
+                        outgoing,
+                        ..node.pair
+                    }
+                    .turned(azimuth),
+                    weight: node.weight / 2.0,
+                }
+            });
+            turned.collect::<Vec<Node>>()
+        });
+        for (largest, found) in largest.iter_mut().zip(at(&halves.concat())?) {
+            *largest = largest.max(found);
+        }
+    }
+    Ok(largest)
 }
 
 /// The albedo of each channel from its values at the nodes.

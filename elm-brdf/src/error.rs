@@ -118,6 +118,12 @@ pub enum Error {
     /// A material of a scene that names no source, or several.
     #[error("expected exactly one of curet, csv, model, table and analytic")]
     MaterialSource,
+    /// A material's rotation that is not finite.
+    #[error("rotation = {found}, expected a number of degrees")]
+    Rotation {
+        /// What was given.
+        found: f64,
+    },
     /// A model with a number of channels that is no colour.
     #[error("a model of {channels} channels cannot be rendered: expected 1 or 3")]
     Channels {

@@ -45,11 +45,19 @@ pub enum Features {
     /// $\sqrt{\theta_h}$, $\cos\theta_d$, $\cos\theta_i$ and $\cos\theta_o$: spreads out the
     /// highlight as [`Highlight`](Self::Highlight) does, and tells light from viewer.
     HighlightCosines,
+    /// $\sqrt{\theta_h}$, $\cos\theta_d$, $\cos\theta_i \cos\theta_o$, $\cos\theta_i + \cos\theta_o$,
+    /// $\sqrt{\theta_h} \cos 2(\varphi_h - \varphi)$ and $\sqrt{\theta_h} \sin 2(\varphi_h - \varphi)$: turns
+    /// with the surface, for one with a grain along or across $\varphi$, and is the same after half a turn.
+    /// Reciprocal.
+    Grain {
+        /// The azimuth $\varphi$ in degrees.
+        degrees: u8,
+    },
 }
 
 impl Features {
     /// Every set there is.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Paper,
         Self::HalfDiff,
         Self::Cosines,
@@ -58,6 +66,7 @@ impl Features {
         Self::Highlight,
         Self::Algebraic,
         Self::HighlightCosines,
+        Self::Grain { degrees: 0 },
     ];
 
     /// The set's name.
@@ -72,6 +81,7 @@ impl Features {
             Self::Highlight => "highlight",
             Self::HighlightCosines => "highlight-cosines",
             Self::Algebraic => "algebraic",
+            Self::Grain { .. } => "grain",
         }
     }
 
@@ -116,6 +126,14 @@ impl Features {
             Self::HighlightCosines => {
                 &["sqrt theta_h", "cos theta_d", "cos theta_i", "cos theta_o"]
             }
+            Self::Grain { .. } => &[
+                "sqrt theta_h",
+                "cos theta_d",
+                "cos theta_i cos theta_o",
+                "cos theta_i + cos theta_o",
+                "sqrt theta_h cos 2 phi_h",
+                "sqrt theta_h sin 2 phi_h",
+            ],
             Self::Algebraic => &[
                 "sqrt sin theta_h",
                 "cos^2 theta_d",
@@ -134,11 +152,34 @@ impl Features {
         )
     }
 
+    /// Whether turning the surface about its normal changes no input.
+    #[must_use]
+    pub fn is_isotropic(self) -> bool {
+        !matches!(self, Self::Grain { .. })
+    }
+
+    /// The azimuth in radians that inputs count from.
+    #[must_use]
+    pub fn azimuth(self) -> f64 {
+        match self {
+            Self::Grain { degrees } => f64::from(degrees).to_radians(),
+            _ => 0.0,
+        }
+    }
+
+    /// The same set for a grain along x.
+    pub(crate) fn along_x(self) -> Self {
+        match self {
+            Self::Grain { .. } => Self::Grain { degrees: 0 },
+            other => other,
+        }
+    }
+
     /// The inputs of each pair of directions, shape (pairs, inputs).
     ///
-    /// All sets depend on the angles $\theta_i$, $\theta_o$ and $|\varphi_i - \varphi_o|$ alone, as
-    /// an isotropic surface does. Finite for every pair of unit vectors, those below the horizon,
-    /// grazing or coincident included.
+    /// All sets but [`Grain`](Self::Grain) depend on the angles $\theta_i$, $\theta_o$ and $|\varphi_i -
+    /// \varphi_o|$ alone, as an isotropic surface does. Finite for every pair of unit vectors, those below
+    /// the horizon, grazing or coincident included.
     #[must_use]
     pub fn compute(self, pairs: &[DirectionPair]) -> Array2<f64> {
         let mut out = Array2::zeros((pairs.len(), self.inputs().len()));
@@ -157,6 +198,7 @@ impl Features {
                 Self::Highlight => fill(row, &highlight(pair)),
                 Self::HighlightCosines => fill(row, &highlight_cosines(pair)),
                 Self::Algebraic => fill(row, &algebraic(pair)),
+                Self::Grain { .. } => fill(row, &grain(pair, self.azimuth())),
             }
         }
         out
@@ -238,6 +280,23 @@ fn highlight(pair: &DirectionPair) -> [f64; 4] {
     ]
 }
 
+fn grain(pair: &DirectionPair, azimuth: f64) -> [f64; 6] {
+    let [root, cos_d, product, sum] = highlight(pair);
+    let pair = pair.turned(-azimuth);
+    let (l, v) = (pair.incident, pair.outgoing);
+    let (x, y) = (l[0] + v[0], l[1] + v[1]);
+    // Along the normal the half vector has no azimuth, and the root is 0.
+    let across = (x * x + y * y).max(f64::MIN_POSITIVE);
+    [
+        root,
+        cos_d,
+        product,
+        sum,
+        root * (x * x - y * y) / across,
+        root * 2.0 * x * y / across,
+    ]
+}
+
 fn highlight_cosines(pair: &DirectionPair) -> [f64; 4] {
     let angles = pair.half_difference();
     [
@@ -308,7 +367,7 @@ mod tests {
             incident: direction,
             outgoing: direction,
         };
-        let expected: [(Features, &[f64]); 6] = [
+        let expected: [(Features, &[f64]); 7] = [
             (Features::HalfDiff, &[FRAC_PI_3, 0.0, 1.0, 0.25, 0.75]),
             (Features::Cosines, &[0.5, 1.0, 0.5, 0.5]),
             (Features::SumDifference, &[0.5, 1.0, 1.0, 0.0]),
@@ -317,6 +376,18 @@ mod tests {
             (
                 Features::HighlightCosines,
                 &[FRAC_PI_3.sqrt(), 1.0, 0.5, 0.5],
+            ),
+            (
+                Features::Grain { degrees: 0 },
+                // The half vector's azimuth is 0.4.
+                &[
+                    FRAC_PI_3.sqrt(),
+                    1.0,
+                    0.25,
+                    1.0,
+                    FRAC_PI_3.sqrt() * 0.8_f64.cos(),
+                    FRAC_PI_3.sqrt() * 0.8_f64.sin(),
+                ],
             ),
         ];
         for (set, values) in expected {
@@ -352,7 +423,7 @@ mod tests {
                 outgoing: cartesian(FRAC_PI_3, 0.1 * f64::from(turn) + 1.0),
             })
             .collect();
-        for set in Features::ALL {
+        for set in Features::ALL.into_iter().filter(|set| set.is_isotropic()) {
             let scaler = elm::Scaler::measured(&set.compute_training(&pairs)).unwrap();
             assert!(scaler.factor().iter().all(|f| *f == 0.0), "{set}");
         }
@@ -360,7 +431,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn reciprocal_sets_are_so_to_the_last_bit_and_all_sets_are_isotropic(
+        fn reciprocal_sets_are_so_to_the_last_bit_and_turns_change_what_they_should(
             theta_i in 0.0..FRAC_PI_2, phi_i in -PI..PI,
             theta_o in 0.0..FRAC_PI_2, phi_o in -PI..PI, turn in -PI..PI,
         ) {
@@ -379,10 +450,19 @@ mod tests {
                 let moved = 4e-15 / original.half_difference().cos_theta_d();
                 let has_root = matches!(
                     set,
-                    Features::Highlight | Features::HighlightCosines | Features::Algebraic
+                    Features::Highlight
+                        | Features::HighlightCosines
+                        | Features::Algebraic
+                        | Features::Grain { .. }
                 );
                 let tolerance = if has_root { moved.sqrt() } else { moved };
-                for other in [pair(turn, 1.0), pair(turn, -1.0)] {
+                // A grain looks the same after half a turn.
+                let others = if set.is_isotropic() {
+                    vec![pair(turn, 1.0), pair(turn, -1.0)]
+                } else {
+                    vec![pair(PI, 1.0)]
+                };
+                for other in others {
                     let other = set.compute(&[other]);
                     prop_assert!(x.iter().zip(&other).all(|(a, b)| (a - b).abs() <= tolerance));
                 }

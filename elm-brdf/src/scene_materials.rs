@@ -5,11 +5,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use elm_brdf_render::{LoadError, LoadedMaterial, MaterialLoader};
 use elm_datasets::Brdf;
+use elm_datasets::brdf::EvalError;
+use elm_datasets::geometry::DirectionPair;
 use elm_datasets::lobes::Formula;
 use elm_datasets::merl::Merl;
 use elm_datasets::rgl::Rgl;
 use elm_datasets::scattered::{self, AngleUnit};
 use elm_datasets::{Format, Invalid, Measurements, OpenOptions, Samples, curet, synthetic};
+use ndarray::ArrayViewMut2;
 use serde::Deserialize;
 
 use crate::baselines;
@@ -68,6 +71,10 @@ pub struct MaterialTable {
     pub specular: Option<f64>,
     /// Colour that the values are multiplied by, for data without colour.
     pub tint: Option<[f64; 3]>,
+    /// Degrees that a material which is not isotropic is turned about the normal, from the surface's tangent
+    /// towards its bitangent. The tangent goes around the vertical axis; of a rectangle it is the edge u.
+    #[serde(default)]
+    pub rotation: f64,
     /// Scale the material down where it would reflect more light than it receives.
     #[serde(default)]
     pub conserve_energy: bool,
@@ -293,6 +300,7 @@ impl MaterialLoader<MaterialTable> for SceneMaterialLoader {
     fn load(&self, table: &MaterialTable, dir: &Path) -> Result<LoadedMaterial, LoadError> {
         let untinted = MaterialTable {
             tint: None,
+            rotation: 0.0,
             conserve_energy: false,
             ..table.clone()
         };
@@ -302,8 +310,20 @@ impl MaterialLoader<MaterialTable> for SceneMaterialLoader {
             Some(made) => made.clone(),
             None => slot.insert(self.make(table, dir)?).clone(),
         };
+        if !table.rotation.is_finite() {
+            let found = table.rotation;
+            return Err(Error::Rotation { found }.into());
+        }
+        let brdf: Box<dyn Brdf> = if made.brdf.is_isotropic() {
+            Box::new(made.brdf)
+        } else {
+            Box::new(Turned {
+                brdf: made.brdf,
+                angle: -table.rotation.to_radians(),
+            })
+        };
         Ok(LoadedMaterial {
-            brdf: Box::new(made.brdf),
+            brdf,
             multiply_adds: made.multiply_adds,
             tint: table.tint.unwrap_or([1.0; 3]),
             conserve_energy: table.conserve_energy,
@@ -311,6 +331,32 @@ impl MaterialLoader<MaterialTable> for SceneMaterialLoader {
             name: made.name,
             notes: made.notes,
         })
+    }
+}
+
+/// A model that is asked for pairs turned about the normal.
+struct Turned {
+    brdf: Arc<dyn Brdf>,
+    /// In radians.
+    angle: f64,
+}
+
+impl Brdf for Turned {
+    fn channels(&self) -> usize {
+        self.brdf.channels()
+    }
+
+    fn is_isotropic(&self) -> bool {
+        self.brdf.is_isotropic()
+    }
+
+    fn eval_into(
+        &self,
+        pairs: &[DirectionPair],
+        values: ArrayViewMut2<'_, f64>,
+    ) -> Result<(), EvalError> {
+        let turned: Vec<DirectionPair> = pairs.iter().map(|p| p.turned(self.angle)).collect();
+        self.brdf.eval_into(&turned, values)
     }
 }
 

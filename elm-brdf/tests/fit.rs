@@ -178,3 +178,37 @@ fn what_cannot_be_fitted_or_judged_is_one_line_and_leaves_no_file() {
         assert!(!absent.exists(), "{arguments:?}");
     }
 }
+
+#[test]
+fn what_measurements_cannot_tell_is_a_warning_each() {
+    let program = Program::new();
+    let dir = tempfile::tempdir().unwrap();
+    let model = dir.path().join("m.elm");
+    let said = |rows: &[(f64, f64, f64)]| {
+        let mut text = String::from("theta_i,phi_i,theta_o,phi_o,grey\n");
+        for (theta_i, theta_o, phi_o) in rows {
+            writeln!(text, "{theta_i},0,{theta_o},{phi_o},0.1").unwrap();
+        }
+        let table = dir.path().join("t.csv");
+        fs::write(&table, text).unwrap();
+        let (table, model) = (table.to_str().unwrap(), model.to_str().unwrap());
+        program.output(&["fit", table, "-o", model, "--degrees"])
+    };
+    let few = said(&[(10.0, 20.0, 0.0), (30.0, 20.0, 90.0), (60.0, 45.0, 140.0)]);
+    assert!(few.contains("warning: 3 measurements are few"), "{few}");
+    assert!(
+        few.contains("has the light or viewer above 60 degrees"),
+        "{few}"
+    );
+    assert!(!few.contains("one plane"), "{few}");
+    let grid = |light: f64| -> Vec<(f64, f64, f64)> {
+        let numbers = (0..24).map(f64::from);
+        numbers
+            .map(|i| (light * i / 23.0, 80.0 * i / 23.0, 7.0 * i))
+            .collect()
+    };
+    let flat = said(&grid(50.0));
+    assert!(flat.contains("has the light above 60 degrees"), "{flat}");
+    assert!(!flat.contains("are few"), "{flat}");
+    assert!(!said(&grid(80.0)).contains("warning"), "{flat}");
+}

@@ -306,8 +306,8 @@ material = 'm'
     let [value, less] = [&as_it_is, &rescaled].map(|picture| picture.pixels[0][0]);
     // Lambert's 1, and of what meets the highlight 0.916 (its directional albedo by an independent sum).
     assert!(value > 1.8, "{value}");
-    // At 87 degrees the highlight's directional albedo is 0.931, and the sum the largest. Half a percent for the
-    // draws of the material's albedo and the pixel's.
+    // At 87 degrees the highlight's directional albedo is 0.931, and the sum the largest. Half a percent for
+    // the draws of the material's albedo and the pixel's.
     assert!((less - 1.916 / 1.931).abs() < 0.005, "{less}");
     let notes = [&as_it_is, &rescaled].map(|picture| picture.account.notes.join("\n"));
     for note in &notes {

@@ -65,6 +65,12 @@ pub trait Brdf: Any + Send + Sync {
     /// Number of values per pair of directions.
     fn channels(&self) -> usize;
 
+    /// Whether turning the surface about its normal changes no value. Where it does, the azimuths of
+    /// directions count from the surface's own tangent.
+    fn is_isotropic(&self) -> bool {
+        true
+    }
+
     /// Writes the BRDF in 1/sr, without the cosine, at each pair of directions; `values` has shape
     /// (pairs, channels). 0 where light or viewer is not above the horizon.
     ///
@@ -93,6 +99,10 @@ impl<B: Brdf + ?Sized> Brdf for Box<B> {
         (**self).channels()
     }
 
+    fn is_isotropic(&self) -> bool {
+        (**self).is_isotropic()
+    }
+
     fn eval_into(
         &self,
         pairs: &[DirectionPair],
@@ -105,6 +115,10 @@ impl<B: Brdf + ?Sized> Brdf for Box<B> {
 impl<B: Brdf + ?Sized> Brdf for Arc<B> {
     fn channels(&self) -> usize {
         (**self).channels()
+    }
+
+    fn is_isotropic(&self) -> bool {
+        (**self).is_isotropic()
     }
 
     fn eval_into(

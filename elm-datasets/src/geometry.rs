@@ -74,6 +74,17 @@ impl DirectionPair {
         }
     }
 
+    /// The pair turned about the normal by an angle in radians, from x towards y.
+    #[must_use]
+    pub fn turned(self, angle: f64) -> Self {
+        let (sin, cos) = angle.sin_cos();
+        let turned = |[x, y, z]: Vector| [cos * x - sin * y, sin * x + cos * y, z];
+        Self {
+            incident: turned(self.incident),
+            outgoing: turned(self.outgoing),
+        }
+    }
+
     /// Whether both directions lie above the surface: nothing is reflected otherwise.
     #[must_use]
     pub fn is_above_horizon(&self) -> bool {

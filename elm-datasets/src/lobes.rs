@@ -1,10 +1,10 @@
 //! Reflectance models in closed form: BRDF in 1/sr, without the cosine.
 //!
-//! All of them are isotropic, reciprocal except for Phong's two (which the paper divides by the
-//! cosine of the light alone), and zero where the light or the viewer is at or below the horizon.
-//! Below, $\theta_h$ is the angle between the normal and the half direction, $\theta_d$ that
-//! between the light and the half direction. No parameter makes them panic; outside the ranges
-//! given the value has no meaning, and may be NaN.
+//! All of them but [`anisotropic_ward`] and [`anisotropic_ggx`] are isotropic, all reciprocal except for
+//! Phong's two (which the paper divides by the cosine of the light alone), and zero where the light or the
+//! viewer is at or below the horizon. Below, $\theta_h$ is the angle between the normal and the half
+//! direction, $\theta_d$ that between the light and the half direction. No parameter makes them panic;
+//! outside the ranges given the value has no meaning, and may be NaN.
 //!
 //! Each model is a function of [`DirectionPair`]. For many evaluations at the same directions there
 //! are [`Cosines`], computed once, whose methods are the models' lobes without a weight.
@@ -40,6 +40,8 @@ pub struct Cosines {
     /// $\cos^2\theta_h$ and $\sin^2\theta_h$, neither as a difference from 1.
     cos2_h: f64,
     sin2_h: f64,
+    /// What of both directions and of the half direction lies along the surface.
+    tangential: [[f64; 2]; 3],
 }
 
 impl Cosines {
@@ -54,13 +56,19 @@ impl Cosines {
         let sum = [0, 1, 2].map(|axis| incident[axis] + outgoing[axis]);
         let plane2 = sum[0] * sum[0] + sum[1] * sum[1];
         let length2 = plane2 + sum[2] * sum[2];
+        let length = length2.sqrt();
         Some(Self {
             cos_i,
             cos_o,
             across: incident[0] * outgoing[0] + incident[1] * outgoing[1],
-            cos_d: (length2.sqrt() / 2.0).min(1.0),
+            cos_d: (length / 2.0).min(1.0),
             cos2_h: sum[2] * sum[2] / length2,
             sin2_h: plane2 / length2,
+            tangential: [
+                [incident[0], incident[1]],
+                [outgoing[0], outgoing[1]],
+                [sum[0] / length, sum[1] / length],
+            ],
         })
     }
 
@@ -98,6 +106,30 @@ impl Cosines {
         distribution * visibility
     }
 
+    /// [Ward's lobe with a direction](anisotropic_ward) of albedo 1.
+    #[must_use]
+    pub fn anisotropic_ward(&self, alpha: [f64; 2], turn: f64) -> f64 {
+        let [x, y] = turned(self.tangential[2], turn);
+        let along_normal = (self.cos_i + self.cos_o) / 2.0;
+        let shape = (self.cos_d / (along_normal * along_normal)).powi(2);
+        let slope2 = ((x / alpha[0]).powi(2) + (y / alpha[1]).powi(2)) / self.cos2_h;
+        shape * (-slope2).exp() / (4.0 * PI * alpha[0] * alpha[1])
+    }
+
+    /// [The lobe of microfacets with a direction](anisotropic_ggx) that reflect all light, $F = 1$.
+    #[must_use]
+    pub fn anisotropic_ggx(&self, alpha: [f64; 2], turn: f64) -> f64 {
+        let [incident, outgoing, half] = self.tangential.map(|part| turned(part, turn));
+        let stretched =
+            |part: [f64; 2]| (part[0] * alpha[0]).powi(2) + (part[1] * alpha[1]).powi(2);
+        let width = (half[0] / alpha[0]).powi(2) + (half[1] / alpha[1]).powi(2) + self.cos2_h;
+        let distribution = FRAC_1_PI / (alpha[0] * alpha[1] * width * width);
+        let smith = |part: [f64; 2], cos: f64| (stretched(part) + cos * cos).sqrt();
+        let visibility = 0.5
+            / (self.cos_o * smith(incident, self.cos_i) + self.cos_i * smith(outgoing, self.cos_o));
+        distribution * visibility
+    }
+
     /// Schlick's $(1 - \cos\theta_d)^5$, what the reflectance of a facet gains of what it lacks.
     #[must_use]
     pub fn schlick(&self) -> f64 {
@@ -125,6 +157,12 @@ impl Cosines {
         let product = along_plane * self.across + along_normal * self.cos_i * self.cos_o;
         (SQRT_2 * product).max(0.0).powf(exponent)
     }
+}
+
+/// In the frame whose x axis is turned by an angle.
+fn turned([x, y]: [f64; 2], angle: f64) -> [f64; 2] {
+    let (sin, cos) = angle.sin_cos();
+    [cos * x + sin * y, cos * y - sin * x]
 }
 
 /// The perfectly diffuse surface: $\rho / \pi$.
@@ -189,6 +227,33 @@ pub fn ward(directions: &DirectionPair, albedo: f64, alpha: f64) -> f64 {
 pub fn ggx(directions: &DirectionPair, f0: f64, alpha: f64) -> f64 {
     Cosines::of(directions).map_or(0.0, |angles| {
         angles.ggx(alpha) * (f0 + (1.0 - f0) * angles.schlick())
+    })
+}
+
+/// [`ward`] with a roughness along and another across a direction of the surface.
+///
+/// `albedo` as there; `alpha` $\alpha_x, \alpha_y > 0$; `turn` the direction's angle from x in radians.
+///
+/// G. Ward, *Measuring and Modeling Anisotropic Reflection*, SIGGRAPH 1992, normalised as [`ward`] is.
+#[must_use]
+pub fn anisotropic_ward(
+    directions: &DirectionPair,
+    albedo: f64,
+    alpha: [f64; 2],
+    turn: f64,
+) -> f64 {
+    Cosines::of(directions).map_or(0.0, |angles| albedo * angles.anisotropic_ward(alpha, turn))
+}
+
+/// [`ggx`] with a roughness along and another across a direction of the surface.
+///
+/// `f0` as there; `alpha` $\alpha_x, \alpha_y$ in (0, 1\]; `turn` the direction's angle from x in radians.
+///
+/// B. Burley, *Physically Based Shading at Disney*, SIGGRAPH 2012 (D); E. Heitz as there (G).
+#[must_use]
+pub fn anisotropic_ggx(directions: &DirectionPair, f0: f64, alpha: [f64; 2], turn: f64) -> f64 {
+    Cosines::of(directions).map_or(0.0, |angles| {
+        angles.anisotropic_ggx(alpha, turn) * (f0 + (1.0 - f0) * angles.schlick())
     })
 }
 

@@ -26,6 +26,7 @@ mod error;
 mod film;
 mod light;
 mod loader;
+mod lobe;
 mod lobe_mixture;
 mod material;
 mod material_cache;

@@ -70,9 +70,10 @@ impl Material {
             let tinted = values.iter().map(|&value| times(value, tint));
             tinted.map(luminance).collect()
         };
-        let pilot = LobeMixture::pilot();
+        let isotropic = brdf.is_isotropic();
+        let pilot = LobeMixture::pilot(isotropic);
         let first = raw(&pilot.pairs)?;
-        let sampler = LobeMixture::fit(&pilot, &grey(&first));
+        let sampler = LobeMixture::fit(&pilot, &grey(&first), isotropic);
         let points = sampler.points();
         let values = raw(&points.pairs)?;
         let highest = first

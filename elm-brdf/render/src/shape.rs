@@ -50,6 +50,8 @@ pub(crate) struct SurfacePoint {
     pub(crate) geometric: Vec3,
     /// Normal of the smooth surface.
     pub(crate) shading: Vec3,
+    /// About along the surface: what azimuths count from where a material is not isotropic.
+    pub(crate) tangent: Vec3,
     /// Where rays to lights start: the point itself, or raised onto the smooth surface.
     pub(crate) lifted: Vec3,
 }
@@ -96,20 +98,21 @@ impl Primitive {
 
     /// The surface where a ray met it.
     pub(crate) fn surface(&self, ray: &Ray, meeting: Intersection) -> SurfacePoint {
-        let flat = |position, normal| SurfacePoint {
+        let flat = |position, normal, tangent| SurfacePoint {
             position,
             geometric: normal,
             shading: normal,
+            tangent,
             lifted: position,
         };
         let position = ray.at(meeting.distance);
         match self {
             Self::Sphere { centre, radius } => {
                 let normal = (position - centre).normalize();
-                flat(centre + normal * *radius, normal)
+                flat(centre + normal * *radius, normal, around(normal))
             }
-            Self::Plane { normal, .. } => flat(position, *normal),
-            Self::Parallelogram { u, v, .. } => flat(position, u.cross(v).normalize()),
+            Self::Plane { normal, .. } => flat(position, *normal, around(*normal)),
+            Self::Parallelogram { u, v, .. } => flat(position, u.cross(v).normalize(), *u),
             Self::Triangle(triangle) => triangle.surface(meeting.uv),
         }
     }
@@ -166,8 +169,22 @@ impl Triangle {
             } else {
                 geometric
             },
+            tangent: around(geometric),
             lifted: position + lift,
         }
+    }
+}
+
+/// The horizontal direction along a surface: around the vertical axis, and along x where the surface is
+/// horizontal.
+fn around(normal: Vec3) -> Vec3 {
+    // Within a thousandth of a degree.
+    const HORIZONTAL: f64 = 1e-5;
+    let across = Vec3::y().cross(&normal);
+    if across.norm() > HORIZONTAL {
+        across
+    } else {
+        Vec3::x()
     }
 }
 

@@ -100,7 +100,7 @@ impl Vertex {
         if cosine < MIN_COSINE {
             shading = (shading + to_viewer * (MIN_COSINE - cosine)).normalize();
         }
-        let frame = ShadingFrame::from_normal(shading);
+        let frame = ShadingFrame::with_tangent(shading, point.tangent);
         Self {
             point,
             outgoing: frame.local(&to_viewer),

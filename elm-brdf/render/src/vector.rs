@@ -61,6 +61,22 @@ impl ShadingFrame {
         }
     }
 
+    /// A frame about the unit vector `n` whose first axis is what of `tangent` lies across it; any where
+    /// nothing does.
+    pub(crate) fn with_tangent(n: Vec3, tangent: Vec3) -> Self {
+        let across = tangent - n * tangent.dot(&n);
+        let length = across.norm();
+        if length.is_nan() || length <= 1e-9 * tangent.norm() {
+            return Self::from_normal(n);
+        }
+        let tangent = across / length;
+        Self {
+            tangent,
+            bitangent: n.cross(&tangent),
+            normal: n,
+        }
+    }
+
     /// A direction of the world in this frame.
     pub(crate) fn local(&self, w: &Vec3) -> Vector {
         [
@@ -91,6 +107,11 @@ mod tests {
             prop_assert!((frame.tangent.cross(&frame.bitangent) - n).norm() < 1e-14);
             let w = Vec3::new(0.3, -0.5, 0.8).normalize();
             prop_assert!((frame.world(frame.local(&w)) - w).norm() < 1e-14);
+            let frame = ShadingFrame::with_tangent(n, w);
+            prop_assert!((frame.tangent.cross(&frame.bitangent) - n).norm() < 1e-12);
+            prop_assert!((frame.world(frame.local(&w)) - w).norm() < 1e-12);
+            let along = ShadingFrame::with_tangent(n, n * 2.0);
+            prop_assert!((along.tangent.cross(&along.bitangent) - n).norm() < 1e-14);
         }
     }
 }

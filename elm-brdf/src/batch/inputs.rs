@@ -63,6 +63,24 @@ pub(super) fn compute<A: Real>(set: Features, d: &[&[A; ROWS]; 6], x: &mut [Bloc
                 };
             }
         }
+        (Features::Grain { .. }, [a, b, c, e, f, g, ..]) => {
+            let (sin, cos) = (2.0 * set.azimuth()).sin_cos();
+            let (sin, cos) = (A::from_f64(sin), A::from_f64(cos));
+            for r in 0..ROWS {
+                let [ix, iy, iz, ox, oy, oz] = d.map(|part| part[r]);
+                let s = Sum::of(d, r);
+                let root = s.across.sqrt().atan2(s.along).sqrt();
+                let (x, y) = (ix + ox, iy + oy);
+                let turned = root / s.across.max(A::min_positive_value());
+                a.0[r] = root;
+                b.0[r] = s.cos_theta_d();
+                c.0[r] = iz * oz;
+                e.0[r] = s.along;
+                let (along, aside) = (x * x - y * y, A::from_f64(2.0) * x * y);
+                f.0[r] = turned * (cos * along + sin * aside);
+                g.0[r] = turned * (cos * aside - sin * along);
+            }
+        }
         (Features::Algebraic, [a, b, c, ..]) => {
             for r in 0..ROWS {
                 let s = Sum::of(d, r);

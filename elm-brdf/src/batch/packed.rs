@@ -297,6 +297,10 @@ macro_rules! brdf {
                 self.links.len()
             }
 
+            fn is_isotropic(&self) -> bool {
+                self.features.is_isotropic()
+            }
+
             fn eval_into(
                 &self,
                 pairs: &[DirectionPair],

@@ -16,6 +16,7 @@ use crate::metrics::Metric;
 use crate::model::{BrdfModel, Tuned};
 use crate::prior::Prior;
 use crate::quality;
+use elm_datasets::geometry::DirectionPair;
 
 /// Fit a network to measurements and save it as one file.
 ///
@@ -94,18 +95,59 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let model = model.with_provenance(about);
     model.save(&arguments.output).map_err(Error::from)?;
     let mut text = describe(&model, &counts, seconds);
-    if quality::in_one_plane(pairs) {
-        text.push_str(ONE_PLANE);
+    if !model.features().is_isotropic() {
+        text.push_str(GRAIN);
     }
+    text.push_str(&what_is_missing(pairs));
     text.push_str(&albedo_of(&model)?);
     text.push_str(&format!("written to {}\n", arguments.output.display()));
     print(&text)
 }
 
+/// What a user of a surface that is not isotropic must know.
+const GRAIN: &str = "\
+the surface has a grain: it looks different when it is turned about its normal, and the model turns with it; \
+azimuths count from the x axis of the measurements\n";
+
 /// What a user with measurements in the plane of incidence must know.
 const ONE_PLANE: &str = "\
-all measurements lie in one plane: they cannot tell how the surface looks from beside it, where the \
+warning: all measurements lie in one plane: they cannot tell how the surface looks from beside it, where the \
 model goes by half and difference angles; errors held out are those in the plane\n";
+
+/// Fewer measurements than this say little of any surface.
+const FEW: usize = 20;
+/// The angle in degrees above which surfaces look most different from what they do below.
+const STEEP: f64 = 60.0;
+
+/// A line for each thing that these measurements cannot tell.
+fn what_is_missing(pairs: &[DirectionPair]) -> String {
+    let mut text = String::new();
+    if pairs.len() < FEW {
+        text.push_str(&format!(
+            "warning: {} measurements are few: between and beyond them the model is a guess\n",
+            pairs.len()
+        ));
+    }
+    // Half a degree for angles that were rounded.
+    let steep = (STEEP + 0.5).to_radians().cos();
+    let seen = |cosine: fn(&DirectionPair) -> f64| pairs.iter().any(|pair| cosine(pair) < steep);
+    let missing = match (seen(|pair| pair.incident[2]), seen(|pair| pair.outgoing[2])) {
+        (true, true) => None,
+        (false, true) => Some("light"),
+        (true, false) => Some("viewer"),
+        (false, false) => Some("light or viewer"),
+    };
+    if let Some(missing) = missing {
+        text.push_str(&format!(
+            "warning: no measurement has the {missing} above {STEEP} degrees from the normal: there the model is a \
+             guess\n"
+        ));
+    }
+    if quality::in_one_plane(pairs) {
+        text.push_str(ONE_PLANE);
+    }
+    text
+}
 
 /// The albedo at the stated angles, the largest of the channels, with a warning above 1.
 fn albedo_of(model: &BrdfModel) -> Result<String, Error> {

@@ -58,6 +58,12 @@ pub enum ExportError {
         /// The model's own held-out RMSE, in 1/sr, where it is known.
         held_out: Option<f64>,
     },
+    /// A model with a grain, for a table that has no place for one.
+    #[error(
+        "a MERL table holds isotropic materials only, and this one has a grain: export source code (--format \
+         glsl, wgsl, hlsl or c), or fit it without (fit --features highlight)"
+    )]
+    Anisotropic,
     /// A model that is no network.
     #[error("only a network can be exported as source")]
     NoNetwork,

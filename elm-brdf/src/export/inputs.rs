@@ -25,6 +25,14 @@ const INPUTS: &[(&str, &str)] = &[
     ("sin theta_e", "sqrt(ox * ox + oy * oy)"),
     ("theta_h", "theta_h"),
     ("sqrt theta_h", "sqrt(theta_h)"),
+    (
+        "sqrt theta_h cos 2 phi_h",
+        "sqrt(theta_h) * (sx * sx - sy * sy) / max(across * across, 1e-30)",
+    ),
+    (
+        "sqrt theta_h sin 2 phi_h",
+        "sqrt(theta_h) * 2.0 * sx * sy / max(across * across, 1e-30)",
+    ),
     ("sqrt sin theta_h", "sqrt(across / sum)"),
     ("cos theta_h", "sz / sum"),
     ("theta_d", "theta_d"),

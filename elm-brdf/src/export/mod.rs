@@ -122,8 +122,8 @@ impl FromStr for Format {
 /// that tells the two apart is put in as the mean of both.
 ///
 /// # Errors
-/// [`Error::Channels`] for a model of another number of channels than 1 or 3; whatever the model's
-/// own evaluation reports.
+/// [`Error::Channels`] for a model of another number of channels than 1 or 3,
+/// [`ExportError::Anisotropic`]; whatever the model's own evaluation reports.
 pub fn merl(brdf: &dyn Brdf) -> Result<Merl> {
     Ok(merl_table(brdf)?.0)
 }
@@ -147,6 +147,9 @@ pub fn merl_table(brdf: &dyn Brdf) -> Result<(Merl, f64)> {
     let channels = brdf.channels();
     if channels != 1 && channels != 3 {
         return Err(Error::Channels { channels });
+    }
+    if !brdf.is_isotropic() {
+        return Err(ExportError::Anisotropic.into());
     }
     // The table asks for one pair at a time, and a network answers many at once far faster: the
     // first pass takes the questions down, the second gives the answers in the same order.

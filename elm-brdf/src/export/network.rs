@@ -2,6 +2,7 @@
 //! functions, single precision.
 
 use super::error::ExportError;
+use crate::features::Features;
 use crate::link::Channel;
 use crate::model::BrdfModel;
 
@@ -57,7 +58,7 @@ impl Network {
         let fold = |weights: &[f64]| -> (Vec<f64>, f64) {
             let scaled: Vec<f64> = (0..inputs).map(|i| weights[i] * scale(i)).collect();
             let constant = (0..inputs).map(|i| -scaled[i] * mean(i)).sum();
-            (scaled, constant)
+            (turned(model.features(), scaled), constant)
         };
 
         let mut neurons = Vec::new();
@@ -136,6 +137,18 @@ impl Network {
                 .collect::<Result<_, ExportError>>()?,
         })
     }
+}
+
+/// Weights of the inputs of a grain along x, for those of one along another direction.
+fn turned(features: Features, mut weights: Vec<f64>) -> Vec<f64> {
+    if let (Features::Grain { .. }, [.., cos_weight, sin_weight]) = (features, &mut weights[..]) {
+        let (sin, cos) = (2.0 * features.azimuth()).sin_cos();
+        (*cos_weight, *sin_weight) = (
+            cos * *cos_weight - sin * *sin_weight,
+            sin * *cos_weight + cos * *sin_weight,
+        );
+    }
+    weights
 }
 
 /// Rounded to single precision, if it has the range.

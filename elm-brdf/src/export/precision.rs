@@ -62,7 +62,8 @@ impl BrdfModel {
     pub fn single_precision_error(&self) -> Result<SinglePrecision> {
         let pairs = survey();
         let network = Network::new(self)?;
-        let inputs = batch::inputs_of::<f32>(self.features(), &pairs);
+        // The network's weights have the direction of a grain in them.
+        let inputs = batch::inputs_of::<f32>(self.features().along_x(), &pairs);
         let exact = self.eval(&pairs)?;
         let mut single = Array2::zeros(exact.dim());
         let mut spread = Array2::zeros(exact.dim());

@@ -85,6 +85,11 @@ fn check_name(name: &str) -> Result<(), ExportError> {
     }
 }
 
+/// What a caller must know of a material with a grain.
+const GRAIN: &str = "\
+// The material has a grain: +x is the surface's tangent, +y its bitangent, as azimuths were measured.
+";
+
 /// The components of both directions, in the shaders' notation.
 const COMPONENTS: [(&str, &str); 6] = [
     ("ix", "light.x"),
@@ -243,7 +248,7 @@ impl<'a> Writer<'a> {
             "// {name}_eval: the BRDF of a material in 1/sr, as linear red, green and blue.\n\
              // light, viewer: unit vectors from the surface, in its own frame with the normal\n\
              // along +z. Black below the horizon.\n\
-             //\n\
+             {grain}//\n\
              // An extreme learning machine, written by elm-brdf {version}.\n\
              // Neurons: {count}, {kinds}\n\
              // Inputs: {inputs}\n\
@@ -254,6 +259,11 @@ impl<'a> Writer<'a> {
             kinds = kinds.join(", "),
             channels = outputs.len(),
             inputs = inputs.join("; "),
+            grain = if inputs.iter().any(|input| input.contains("phi_h")) {
+                GRAIN
+            } else {
+                ""
+            },
         );
         match self.language {
             Language::Glsl => self.out.push_str("precision highp float;\n\n"),

@@ -249,6 +249,10 @@ impl Brdf for BrdfModel {
         self.network.outputs()
     }
 
+    fn is_isotropic(&self) -> bool {
+        self.features.is_isotropic()
+    }
+
     fn eval_into(
         &self,
         pairs: &[DirectionPair],

@@ -6,6 +6,7 @@ mod distill;
 mod errors;
 mod few;
 mod finish;
+mod grain;
 mod lean;
 mod limit;
 mod many;
@@ -151,30 +152,33 @@ impl Tuned {
     ) -> Result<BrdfModel> {
         check(pairs, values)?;
         let mut link = Link::default_log().fit(values)?;
+        let direction = grain::detect(pairs, link.to_targets(values)?.view())?;
         if pairs.len() > Self::LIMIT {
             let rows = many::search_rows(self, pairs.len());
-            let sets = self.sets(&Self::MANY_SETS);
+            let sets = self.sets(&Self::MANY_SETS, direction);
             let mut settings = many::search(self, &link, pairs, values, &rows, &sets)?;
             let noise = settings.first().map_or(Vec::new(), many::Setting::noise);
             let raised = link.raise_offsets(&noise);
             if raised.iter().any(|&factor| factor > 1.0) {
                 settings = many::search(self, &link, pairs, values, &rows, &sets)?;
             }
-            let problem = self.problem(pairs, values, link, noise, &raised)?;
+            let grain = settings.first().is_some_and(many::Setting::has_grain);
+            let problem = self.problem(pairs, values, link, noise, &raised, grain)?;
             let found = many::best(&problem, &settings, &rows)?;
             return model_of(&problem, found);
         }
-        let mut search = few::Search::new(self, pairs, values, &link)?;
+        let mut search = few::Search::new(self, pairs, values, &link, direction)?;
         let noise = search.noise(&link)?;
         let raised = link.raise_offsets(&noise);
         if raised.iter().any(|&factor| factor > 1.0) {
-            search = few::Search::new(self, pairs, values, &link)?;
+            search = few::Search::new(self, pairs, values, &link, direction)?;
         }
-        let problem = self.problem(pairs, values, link, noise, &raised)?;
+        let grain = search.has_grain();
+        let problem = self.problem(pairs, values, link, noise, &raised, grain)?;
         let mut found = search.best(&problem)?;
         if pairs.len() > Self::FEW {
             let rows = many::search_rows(self, pairs.len());
-            let sets = self.sets(&Self::FEW_SETS);
+            let sets = self.sets(&Self::FEW_SETS, direction);
             let settings = many::search(self, &problem.link, pairs, values, &rows, &sets)?;
             let other = many::best(&problem, &settings, &rows)?;
             if problem.noisy && other.excess <= found.excess {
@@ -194,14 +198,21 @@ impl Tuned {
         link: FittedLink,
         noise: Vec<f64>,
         raised: &[f64],
+        grain: bool,
     ) -> Result<Problem<'a>> {
         let noisy = raised.iter().any(|&factor| factor > NOISY);
-        Problem::new(self, pairs, values, link, noise, noisy)
+        Problem::new(self, pairs, values, link, noise, noisy, grain)
     }
 
-    /// The sets of inputs to choose among: one where it is given.
-    fn sets(&self, sets: &[Features]) -> Vec<Features> {
-        self.features.map_or_else(|| sets.to_vec(), |set| vec![set])
+    /// The sets of inputs to choose among: one where it is given; else these, and those of a grain where one
+    /// is found.
+    fn sets(&self, sets: &[Features], grain: Option<Features>) -> Vec<Features> {
+        match self.features {
+            // In the direction that is found.
+            Some(set) if !set.is_isotropic() => vec![grain.unwrap_or(set)],
+            Some(set) => vec![set],
+            None => sets.iter().copied().chain(grain).collect(),
+        }
     }
 
     /// The most numbers to be stored: what is asked for, or what was measured, or of many half of it;
@@ -296,6 +307,10 @@ pub struct SideBySide(pub(crate) Vec<BrdfModel>);
 impl Brdf for SideBySide {
     fn channels(&self) -> usize {
         self.0.iter().map(Brdf::channels).sum()
+    }
+
+    fn is_isotropic(&self) -> bool {
+        self.0.iter().all(Brdf::is_isotropic)
     }
 
     fn eval_into(

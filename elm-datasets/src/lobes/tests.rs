@@ -9,7 +9,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, FRAC_PI_4, FRAC_PI_6};
 type Model = fn(&DirectionPair) -> f64;
 
 /// White surfaces, with the most that one may return.
-const WHITE: [(&str, Model, f64); 9] = [
+const WHITE: [(&str, Model, f64); 11] = [
     ("lambert", |d| lambert(d, 1.0), 1.0),
     ("oren_nayar 0.2", |d| oren_nayar(d, 1.0, 0.2), 1.015),
     ("oren_nayar 0.8", |d| oren_nayar(d, 1.0, 0.8), 1.0),
@@ -19,6 +19,16 @@ const WHITE: [(&str, Model, f64); 9] = [
     ("ggx 0.1", |d| ggx(d, 1.0, 0.1), 1.0),
     ("ggx 0.3", |d| ggx(d, 1.0, 0.3), 1.0),
     ("ggx 1", |d| ggx(d, 1.0, 1.0), 1.0),
+    (
+        "ward with a direction",
+        |d| anisotropic_ward(d, 1.0, [0.1, 0.4], FRAC_PI_2),
+        1.0,
+    ),
+    (
+        "ggx with a direction",
+        |d| anisotropic_ggx(d, 1.0, [0.1, 0.4], 0.0),
+        1.0,
+    ),
 ];
 
 /// The share of light from `theta_i` that is reflected, by the midpoint rule in
@@ -70,6 +80,40 @@ fn a_smooth_diffuse_surface_is_lamberts() {
         phi_o: -2.0,
     });
     assert_eq!(oren_nayar(&pair, 0.7, 0.0), lambert(&pair, 0.7));
+}
+
+#[test]
+fn lobes_with_a_direction_turn_with_it_and_without_one_are_the_isotropic_ones() {
+    let pair = DirectionPair::from(Angles {
+        theta_i: 0.9,
+        phi_i: 0.4,
+        theta_o: 0.6,
+        phi_o: 2.8,
+    });
+    let alpha = [0.2, 0.5];
+    for turn in [0.0, 0.7, 3.0] {
+        let turned = pair.turned(turn);
+        assert_relative_eq!(
+            anisotropic_ggx(&turned, 0.3, alpha, turn),
+            anisotropic_ggx(&pair, 0.3, alpha, 0.0),
+            max_relative = 1e-12
+        );
+        assert_relative_eq!(
+            anisotropic_ward(&turned, 0.3, alpha, turn),
+            anisotropic_ward(&pair, 0.3, alpha, 0.0),
+            max_relative = 1e-12
+        );
+        assert_relative_eq!(
+            anisotropic_ggx(&pair, 0.3, [0.2; 2], turn),
+            ggx(&pair, 0.3, 0.2),
+            max_relative = 1e-12
+        );
+        assert_relative_eq!(
+            anisotropic_ward(&pair, 0.3, [0.2; 2], turn),
+            ward(&pair, 0.3, 0.2),
+            max_relative = 1e-12
+        );
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The models, each as a weighted sum of terms whose shape has a few parameters of its own.
 
-use std::f64::consts::{FRAC_1_PI, FRAC_PI_2};
+use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 
 use elm_datasets::lobes::Cosines;
 
@@ -32,6 +32,10 @@ pub enum Analytic {
     GgxLambert,
     /// Oren and Nayar's diffuse part and microfacets with the GGX distribution.
     GgxOrenNayar,
+    /// A diffuse part and Ward's lobe with a direction along the surface.
+    AnisotropicWard,
+    /// A diffuse part and microfacets with the GGX distribution, rougher in one direction than in the other.
+    AnisotropicGgx,
     /// A diffuse part and one of Lafortune's lobes.
     Lafortune,
     /// A diffuse part and two of Lafortune's lobes.
@@ -91,6 +95,12 @@ const ALPHA: Shape = Shape::logarithmic("alpha", 0.02, 1.0, 12);
 const WARD_ALPHA: Shape = Shape::logarithmic("alpha", 0.02, 3.0, 14);
 const DIRECTION: Shape = Shape::linear("direction", -FRAC_PI_2, FRAC_PI_2, 9);
 const LOBE: Shape = Shape::logarithmic("exponent", 0.1, 500.0, 8);
+// Along, across and the angle from x: coarser, as the grid has all three.
+const DIRECTED: [Shape; 3] = [
+    Shape::logarithmic("alpha along", 0.02, 1.0, 6),
+    Shape::logarithmic("alpha across", 0.02, 1.0, 6),
+    Shape::linear("turn", 0.0, PI, 7),
+];
 // Coarser, as the grid has every pair of lobes.
 const OF_TWO: [Shape; 2] = [
     Shape::linear("direction", -FRAC_PI_2, FRAC_PI_2, 7),
@@ -99,7 +109,7 @@ const OF_TWO: [Shape; 2] = [
 
 impl Analytic {
     /// Every model, from the simplest.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 11] = [
         Self::Lambert,
         Self::Phong,
         Self::BlinnPhong,
@@ -107,6 +117,8 @@ impl Analytic {
         Self::Ward,
         Self::GgxLambert,
         Self::GgxOrenNayar,
+        Self::AnisotropicWard,
+        Self::AnisotropicGgx,
         Self::Lafortune,
         Self::Lafortune2,
     ];
@@ -122,6 +134,8 @@ impl Analytic {
             Self::Ward => "ward+lambert",
             Self::GgxLambert => "ggx+lambert",
             Self::GgxOrenNayar => "ggx+oren-nayar",
+            Self::AnisotropicWard => "anisotropic-ward+lambert",
+            Self::AnisotropicGgx => "anisotropic-ggx+lambert",
             Self::Lafortune => "lafortune-1",
             Self::Lafortune2 => "lafortune-2",
         }
@@ -137,6 +151,7 @@ impl Analytic {
             Self::Ward => &[WARD_ALPHA],
             Self::GgxLambert => &[ALPHA],
             Self::GgxOrenNayar => &[SIGMA, ALPHA],
+            Self::AnisotropicWard | Self::AnisotropicGgx => &DIRECTED,
             Self::Lafortune => &[DIRECTION, LOBE],
             Self::Lafortune2 => &[OF_TWO[0], OF_TWO[1], OF_TWO[0], OF_TWO[1]],
         }
@@ -149,8 +164,8 @@ impl Analytic {
         match self {
             Self::Lambert | Self::OrenNayar => &["diffuse albedo"],
             Self::Phong | Self::BlinnPhong => &["diffuse", "specular"],
-            Self::Ward => &["diffuse albedo", "specular albedo"],
-            Self::GgxLambert | Self::GgxOrenNayar => {
+            Self::Ward | Self::AnisotropicWard => &["diffuse albedo", "specular albedo"],
+            Self::GgxLambert | Self::GgxOrenNayar | Self::AnisotropicGgx => {
                 &["diffuse albedo", "specular f0", "specular 1 - f0"]
             }
             Self::Lafortune => &["diffuse albedo", "lobe"],
@@ -162,6 +177,12 @@ impl Analytic {
     #[must_use]
     pub fn is_reciprocal(self) -> bool {
         !matches!(self, Self::Phong | Self::BlinnPhong)
+    }
+
+    /// Whether turning the surface about its normal changes nothing.
+    #[must_use]
+    pub fn is_isotropic(self) -> bool {
+        !matches!(self, Self::AnisotropicWard | Self::AnisotropicGgx)
     }
 
     /// The value of each term for these shape parameters.
@@ -180,6 +201,14 @@ impl Analytic {
             Self::GgxOrenNayar => {
                 let lobe = angles.ggx(second);
                 [angles.oren_nayar(first), lobe, lobe * angles.schlick()]
+            }
+            Self::AnisotropicWard => {
+                let lobe = angles.anisotropic_ward([first, second], third);
+                [FRAC_1_PI, lobe, 0.0]
+            }
+            Self::AnisotropicGgx => {
+                let lobe = angles.anisotropic_ggx([first, second], third);
+                [FRAC_1_PI, lobe, lobe * angles.schlick()]
             }
             Self::Lafortune => [FRAC_1_PI, angles.lafortune(first, second), 0.0],
             Self::Lafortune2 => [

@@ -138,6 +138,10 @@ impl Brdf for AnalyticModel {
         self.channels.len()
     }
 
+    fn is_isotropic(&self) -> bool {
+        self.family.is_isotropic()
+    }
+
     fn eval_into(
         &self,
         pairs: &[DirectionPair],

@@ -32,13 +32,25 @@ const LISTED: usize = 24;
 /// Measurements left out to see what guesses are worth.
 const JUDGED: usize = 200;
 
-/// Coordinates in which near means alike.
-fn place(pair: &DirectionPair) -> [f64; 3] {
+/// Coordinates in which near means alike; the last two turn with a surface that has a `grain`.
+fn place(pair: &DirectionPair, grain: bool) -> [f64; 5] {
     let angles = pair.half_difference();
+    let root = 2.0 * angles.theta_h().sqrt();
+    let (x, y) = (
+        pair.incident[0] + pair.outgoing[0],
+        pair.incident[1] + pair.outgoing[1],
+    );
+    let turned = if grain {
+        root / (x * x + y * y).max(f64::MIN_POSITIVE)
+    } else {
+        0.0
+    };
     [
-        2.0 * angles.theta_h().sqrt(),
+        root,
         angles.theta_d(),
         0.5 * (pair.incident[2] + pair.outgoing[2]),
+        turned * (x * x - y * y),
+        turned * 2.0 * x * y,
     ]
 }
 
@@ -47,23 +59,24 @@ type Near = (f64, usize);
 
 /// The measurements by their place.
 pub(super) struct Neighbourhood {
-    places: Vec<[f64; 3]>,
+    places: Vec<[f64; 5]>,
+    grain: bool,
 }
 
 impl Neighbourhood {
-    pub(super) fn new(pairs: &[DirectionPair]) -> Self {
+    pub(super) fn new(pairs: &[DirectionPair], grain: bool) -> Self {
         Self {
-            places: pairs.iter().map(place).collect(),
+            places: pairs.iter().map(|pair| place(pair, grain)).collect(),
+            grain,
         }
     }
 
     /// The nearest measurements but `without`, the nearest first.
-    fn nearest(&self, at: [f64; 3], count: usize, without: Option<usize>) -> Vec<Near> {
+    fn nearest(&self, at: [f64; 5], count: usize, without: Option<usize>) -> Vec<Near> {
         let mut near: Vec<Near> = Vec::with_capacity(count + 1);
         for (row, place) in self.places.iter().enumerate() {
-            let distance = (place[0] - at[0]).powi(2)
-                + (place[1] - at[1]).powi(2)
-                + (place[2] - at[2]).powi(2);
+            let along = place.iter().zip(&at).map(|(a, b)| (a - b).powi(2));
+            let distance: f64 = along.sum();
             let full = near.len() == count;
             if Some(row) == without || full && near.last().is_some_and(|last| distance >= last.0) {
                 continue;
@@ -83,7 +96,7 @@ impl Neighbourhood {
     ) -> Array2<f64> {
         let mut guesses = Array2::zeros((pairs.len(), values.ncols()));
         for (pair, guess) in pairs.iter().zip(guesses.rows_mut()) {
-            let near = self.nearest(place(pair), NEAREST, None);
+            let near = self.nearest(place(pair, self.grain), NEAREST, None);
             mean_of(&near, values, guess);
         }
         guesses
@@ -118,8 +131,8 @@ pub(super) struct Anchors {
 impl Anchors {
     pub(super) fn new(neighbourhood: &Neighbourhood, seed: u64) -> Self {
         let mut random = generator(seed, streams::ANCHORS);
-        let pairs = scatter(&mut random);
-        let near = pairs.iter().map(place);
+        let pairs = scatter(&mut random, neighbourhood.grain);
+        let near = pairs.iter().map(|pair| place(pair, neighbourhood.grain));
         let near = near.map(|at| neighbourhood.nearest(at, LISTED, None));
         let rows = neighbourhood.places.len();
         let judged = index::sample(&mut random, rows, JUDGED.min(rows));
@@ -180,7 +193,8 @@ impl Anchors {
 
 /// Pairs of directions over the hemisphere: half of [`ANCHORS`] anywhere by both angles, half by the
 /// half vector, near the mirror direction; and [`GRAZING`] ones in both of whose directions near the horizon.
-pub(super) fn scatter(random: &mut ChaCha8Rng) -> Vec<DirectionPair> {
+/// For a surface with a grain each is turned about the normal.
+pub(super) fn scatter(random: &mut ChaCha8Rng, grain: bool) -> Vec<DirectionPair> {
     let mut pairs = Vec::with_capacity(ANCHORS + GRAZING);
     while pairs.len() < ANCHORS {
         if pairs.len() % 2 == 0 {
@@ -222,6 +236,11 @@ pub(super) fn scatter(random: &mut ChaCha8Rng) -> Vec<DirectionPair> {
             incident: cartesian(theta_i, 0.0),
             outgoing: cartesian(theta_o, PI * (1.0 - part * part)),
         });
+    }
+    if grain {
+        for pair in &mut pairs {
+            *pair = pair.turned(random.random_range(0.0..TAU));
+        }
     }
     pairs
 }

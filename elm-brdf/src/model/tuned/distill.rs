@@ -59,7 +59,7 @@ impl Places {
         let judged = problem.judged_pairs.iter().copied();
         let mut pairs: Vec<DirectionPair> = judged.take(MEASURED).collect();
         let measured = pairs.len();
-        pairs.extend(scatter(&mut random));
+        pairs.extend(scatter(&mut random, problem.grain));
         let (targets, without) = teacher.targets(&pairs);
         let values = problem.link.to_values(targets.clone())?;
         let weights = row_weights(problem.tuned.metric, &pairs, values.view(), &problem.link);
@@ -107,7 +107,7 @@ impl Problem<'_> {
     fn like(&self, features: Features, map: &FeatureMap<f64>, places: &Places) -> Result<Fitted> {
         let h = map.transform(&places.x)?;
         let judged = map.transform(&features.compute(&self.judged_pairs))?;
-        let survey = Survey::new();
+        let survey = Survey::new(self.grain);
         let mut best: Option<Fitted> = None;
         let mut between = BETWEEN;
         for _ in 0..=STEPS {

@@ -29,6 +29,9 @@ const FIRST: (usize, usize) = (120, 15);
 const SECOND: (usize, usize) = (240, 14);
 /// Sets whose evidence is lower than the best by no more than this for each value look as good.
 const CLOSE: f64 = 0.3;
+/// Inputs that turn with the surface must have an evidence higher by this for each value: a grain is plain to
+/// see, or none.
+const GRAIN: f64 = 0.3;
 /// Rows that the limit is fitted to, at most: it costs their cube.
 const LIMIT_ROWS: usize = 600;
 /// Folds for the noise.
@@ -59,6 +62,7 @@ impl<'a> Search<'a> {
         pairs: &[DirectionPair],
         values: ArrayView2<'_, f64>,
         link: &FittedLink,
+        grain: Option<Features>,
     ) -> Result<Self> {
         let targets = link.to_targets(values)?;
         let mut random = generator(tuned.seed, streams::FEW);
@@ -75,7 +79,7 @@ impl<'a> Search<'a> {
                 weights.mapv(|weight| mean / weight.max(1e-6 * mean))
             },
         );
-        let sets = tuned.sets(&Tuned::FEW_SETS);
+        let sets = tuned.sets(&Tuned::FEW_SETS, grain);
         let mut found: Vec<Found> = sets
             .into_iter()
             .map(|features| {
@@ -89,17 +93,17 @@ impl<'a> Search<'a> {
                 Found::first(features, scaler, rows)
             })
             .collect::<Result<_>>()?;
-        sort(&mut found);
-        let per_value = |rows: usize| (targets.nrows().min(rows) * targets.ncols()) as f64;
-        let most = found[0].setting.evidence;
-        let least = most - CLOSE * per_value(FIRST.0);
+        let values_of = |rows: usize| (targets.nrows().min(rows) * targets.ncols()) as f64;
+        let few = values_of(FIRST.0);
+        sort(&mut found, few);
+        let least = found[0].rank(few) - CLOSE * few;
         let (mut close, others): (Vec<_>, Vec<_>) = found
             .into_iter()
-            .partition(|found| found.setting.evidence >= least);
+            .partition(|found| found.rank(few) >= least);
         for found in &mut close {
             found.improve(SECOND)?;
         }
-        sort(&mut close);
+        sort(&mut close, values_of(SECOND.0));
         close.extend(others);
         Ok(Self {
             tuned,
@@ -107,6 +111,12 @@ impl<'a> Search<'a> {
             rows,
             found: close,
         })
+    }
+
+    /// Whether the best set's inputs turn with the surface.
+    pub(super) fn has_grain(&self) -> bool {
+        let best = self.found.first();
+        best.is_some_and(|best| !best.features.is_isotropic())
     }
 
     /// The standard deviation of the noise of each channel's dark half, in 1/sr: of what the best
@@ -220,6 +230,15 @@ impl Found {
         })
     }
 
+    /// What sets are compared by: the evidence of this many values.
+    fn rank(&self, values: f64) -> f64 {
+        if self.features.is_isotropic() {
+            self.setting.evidence
+        } else {
+            self.setting.evidence - GRAIN * values
+        }
+    }
+
     fn improve(&mut self, (rows, rounds): (usize, usize)) -> Result<()> {
         self.setting = first_of(&self.rows, rows).improved(&self.setting, rounds)?;
         Ok(())
@@ -243,8 +262,9 @@ fn first_of(rows: &Rows, count: usize) -> Rows {
     rows.select(&(0..rows.x.nrows().min(count)).collect::<Vec<_>>())
 }
 
-fn sort(found: &mut [Found]) {
-    found.sort_by(|a, b| b.setting.evidence.total_cmp(&a.setting.evidence));
+/// The best first, by the evidence of this many values.
+fn sort(found: &mut [Found], values: f64) {
+    found.sort_by(|a, b| b.rank(values).total_cmp(&a.rank(values)));
 }
 
 fn standardised(scaler: &Scaler<f64>, x: &Array2<f64>) -> Array2<f64> {

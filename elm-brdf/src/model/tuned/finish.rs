@@ -84,7 +84,7 @@ impl Problem<'_> {
         let (strength, held_out) = self.strength(&rows, &reach, None, (2..STRENGTHS).step_by(2))?;
         let at_anchors = map.transform(&features.compute(&self.anchors.pairs))?;
         let mut pull = Pull::new(self, at_anchors, &self.variances(&held_out));
-        let survey = Survey::new();
+        let survey = Survey::new(self.grain);
         let mut best = None;
         for _ in 0..=STEPS {
             let near = rows.near(strength);

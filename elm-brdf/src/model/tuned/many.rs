@@ -38,6 +38,9 @@ const MOST_FINISHED: usize = 4;
 /// Sets whose scales are moved, at most, and how far off these may be at first.
 const MOVED: usize = 3;
 const FAR: f64 = 1.6;
+/// Inputs that turn with the surface are taken where their error is this many times smaller: a grain is
+/// plain to see, or none.
+const GRAIN: f64 = 1.25;
 /// Where every scale begins.
 const FIRST_SCALE: f64 = 0.7;
 
@@ -148,6 +151,11 @@ pub(super) struct Setting {
 }
 
 impl Setting {
+    /// Whether its inputs turn with the surface.
+    pub(super) fn has_grain(&self) -> bool {
+        !self.set.is_isotropic()
+    }
+
     /// The standard deviation of the noise of each channel's dark half, in 1/sr.
     pub(super) fn noise(&self) -> Vec<f64> {
         let columns = self.predicted.columns().into_iter();
@@ -239,7 +247,9 @@ impl<'a> Search<'a> {
         }
         let mut settings: Vec<Setting> = found.into_iter().map(|(_, best)| best).collect();
         let handicap = |setting: &Setting| {
-            if setting.set.is_reciprocal() {
+            if !setting.set.is_isotropic() {
+                GRAIN * setting.error
+            } else if setting.set.is_reciprocal() {
                 setting.error
             } else {
                 TIE * setting.error

@@ -28,6 +28,8 @@ pub(super) struct Problem<'a> {
     pub(super) noise: Vec<f64>,
     /// Whether that is as large as values are.
     pub(super) noisy: bool,
+    /// Whether the surface has a grain.
+    pub(super) grain: bool,
     pub(super) targets: Array2<f64>,
     pub(super) weights: Option<Array1<f64>>,
     /// The rows that are left out in turn, fold by fold.
@@ -49,6 +51,7 @@ impl<'a> Problem<'a> {
         link: FittedLink,
         noise: Vec<f64>,
         noisy: bool,
+        grain: bool,
     ) -> Result<Self> {
         let mut random = generator(tuned.seed, streams::JUDGED);
         let rows = pairs.len();
@@ -64,7 +67,7 @@ impl<'a> Problem<'a> {
             .collect();
         let known_pairs: Vec<DirectionPair> =
             known.iter().map(|&place| judged_pairs[place]).collect();
-        let neighbourhood = Neighbourhood::new(&known_pairs);
+        let neighbourhood = Neighbourhood::new(&known_pairs, grain);
         Ok(Self {
             targets: link.to_targets(values)?,
             weights: row_weights(tuned.metric, pairs, values, &link),
@@ -75,6 +78,7 @@ impl<'a> Problem<'a> {
             link,
             noise,
             noisy,
+            grain,
             folds,
             judged,
             judged_pairs,

@@ -1,5 +1,7 @@
 //! Whether a network returns more light than it receives, against what its measurements give.
 
+use std::f64::consts::FRAC_PI_2;
+
 use elm::Elm;
 use ndarray::Array2;
 
@@ -30,17 +32,25 @@ pub(super) struct Survey {
 }
 
 impl Survey {
-    pub(super) fn new() -> Self {
+    /// For a surface with a `grain` the light comes along and across it, where both halves of the viewers
+    /// see the same.
+    pub(super) fn new(grain: bool) -> Self {
+        let turns: &[f64] = if grain { &[0.0, FRAC_PI_2] } else { &[0.0] };
         let angles = albedo::ANGLES.into_iter().chain(FURTHER_ANGLES);
         Self {
             angles: angles
-                .map(|angle| {
+                .flat_map(|angle| turns.iter().map(move |&turn| (angle, turn)))
+                .map(|(angle, turn)| {
                     let borne = if angle > GRAZING {
                         GRAZING_ALLOWED
                     } else {
                         1.0
                     };
-                    (borne, albedo::nodes(angle.to_radians()))
+                    let mut nodes = albedo::nodes(angle.to_radians());
+                    for node in &mut nodes {
+                        node.pair = node.pair.turned(turn);
+                    }
+                    (borne, nodes)
                 })
                 .collect(),
         }
@@ -70,7 +80,11 @@ impl Survey {
                         node.pair
                     }
                 };
-                let pairs: Vec<DirectionPair> = nodes.iter().map(of).collect();
+                let turned = |node: &Node| of(node).turned(features.azimuth());
+                let pairs: Vec<DirectionPair> = match features.is_isotropic() {
+                    true => nodes.iter().map(of).collect(),
+                    false => nodes.iter().map(turned).collect(),
+                };
                 let sums = |targets: Array2<f64>| -> Result<Vec<f64>> {
                     Ok(albedo::sums(nodes, link.to_values(targets)?.view()))
                 };
