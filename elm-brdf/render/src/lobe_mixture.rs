@@ -199,7 +199,11 @@ impl LobeMixture {
                     .sum();
                 for (lobe, (_, weights)) in self.lobes.iter_mut().enumerate() {
                     if is_free(lobe) {
-                        weights[term] *= if free > 0.0 { rest / free } else { 0.0 };
+                        weights[term] = if free > 0.0 {
+                            weights[term] * (rest / free)
+                        } else {
+                            0.0
+                        };
                     }
                 }
                 let below = (0..LEAST.len())
@@ -269,6 +273,8 @@ struct Problem {
 impl Problem {
     fn new(mixture: &LobeMixture, points: &Points, values: &[f64]) -> Self {
         let all = points.pairs.iter().zip(&points.weights).zip(values);
+        // The size of values does not matter, and squares of large ones are no numbers.
+        let largest = values.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
         Self {
             densities: mixture
                 .lobes
@@ -276,7 +282,9 @@ impl Problem {
                 .map(|(lobe, _)| points.densities(*lobe))
                 .collect(),
             squares: all
-                .map(|((pair, weight), value)| (value * pair.incident[2]).powi(2) * weight)
+                .map(|((pair, weight), value)| {
+                    (value / largest * pair.incident[2]).powi(2) * weight
+                })
                 .collect(),
             terms: (0..VIEWS)
                 .map(|view| terms(view_angle(view).cos()))
@@ -411,6 +419,12 @@ mod tests {
         );
         let share: f64 = ggx.map(|(_, share)| share).sum();
         assert!(share > 0.85, "{shares:?}");
+
+        let huge: Vec<f64> = values.iter().map(|value| 1e300 * value).collect();
+        let same = LobeMixture::fit(&points, &huge, true);
+        let incident = cartesian(0.9, 3.0);
+        let ratio = same.density(outgoing, incident) / found.density(outgoing, incident);
+        assert!((ratio - 1.0).abs() < 1e-6, "{ratio}");
 
         let black = LobeMixture::fit(&points, &vec![0.0; points.pairs.len()], true);
         let incident = cartesian(0.5, 2.0);
