@@ -314,7 +314,7 @@ impl MaterialLoader<MaterialTable> for SceneMaterialLoader {
             let found = table.rotation;
             return Err(Error::Rotation { found }.into());
         }
-        let brdf: Box<dyn Brdf> = if made.brdf.is_isotropic() {
+        let brdf: Box<dyn Brdf> = if made.brdf.is_isotropic() || table.rotation == 0.0 {
             Box::new(made.brdf)
         } else {
             Box::new(Turned {

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::vector::ShadingFrame;
-use elm_datasets::geometry::Vector;
+use elm_datasets::geometry::{Vector, dot};
 
 /// Between which widths in radians and roughnesses are.
 const WIDTHS: (f64, f64) = (0.005, 4.0);
@@ -39,10 +39,6 @@ pub(crate) enum Lobe {
 /// The direction on the other side of the surface.
 fn below([x, y, z]: Vector) -> Vector {
     [x, y, -z]
-}
-
-fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 impl Lobe {

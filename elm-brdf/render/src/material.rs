@@ -145,7 +145,7 @@ impl Material {
     }
 
     /// Directional albedo, as luminance: the part of light from `theta_o` (radians) that is
-    /// reflected, for each of some angles (theta_o, albedo).
+    /// reflected, for each of some angles (theta_o, albedo). The mean over all azimuths.
     #[must_use]
     pub fn albedo(&self) -> Vec<(f64, f64)> {
         let scaled = |&(theta_o, albedo)| (theta_o, self.scale * albedo);
@@ -169,6 +169,12 @@ impl Material {
     #[must_use]
     pub fn max_value(&self) -> Rgb {
         scaled(self.factor, self.max_value)
+    }
+
+    /// Whether turning the surface about its normal changes nothing.
+    #[must_use]
+    pub fn is_isotropic(&self) -> bool {
+        self.brdf.is_isotropic()
     }
 
     /// Number of channels that are evaluated.

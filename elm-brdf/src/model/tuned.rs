@@ -152,7 +152,10 @@ impl Tuned {
     ) -> Result<BrdfModel> {
         check(pairs, values)?;
         let mut link = Link::default_log().fit(values)?;
-        let direction = grain::detect(pairs, link.to_targets(values)?.view())?;
+        let direction = match self.features {
+            Some(set) if set.is_isotropic() => None,
+            _ => grain::detect(pairs, link.to_targets(values)?.view())?,
+        };
         if pairs.len() > Self::LIMIT {
             let rows = many::search_rows(self, pairs.len());
             let sets = self.sets(&Self::MANY_SETS, direction);

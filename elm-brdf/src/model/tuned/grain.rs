@@ -37,7 +37,8 @@ pub(super) fn detect(
     let mean = targets.mean_axis(Axis(1)).unwrap_or_default();
     let targets = mean.select(Axis(0), &rows).insert_axis(Axis(1));
     let terms = Terms::of(&some);
-    let isotropic = terms.columns(0, terms.isotropic).to_owned();
+    let isotropic = Slice::from(..terms.isotropic);
+    let isotropic = terms.all.slice_axis(Axis(1), isotropic).to_owned();
     let without = left_out(&isotropic, &targets)?;
     let with = left_out(&terms.all, &targets)?;
     if with.is_nan() || with > (1.0 - EXPLAINED) * without {
@@ -70,10 +71,8 @@ struct Terms {
     /// Those in the isotropic inputs first.
     all: Array2<f64>,
     isotropic: usize,
-    /// Powers of the half vector's angle; each has a term with the cosine and one with the sine of twice its
-    /// azimuth.
-    powers: usize,
-    /// These powers, shape (pairs, powers).
+    /// Powers of the root of the half vector's angle, shape (pairs, powers); each has a term with the cosine
+    /// and one with the sine of twice its azimuth.
     roots: Array2<f64>,
 }
 
@@ -119,26 +118,21 @@ impl Terms {
         Self {
             all,
             isotropic,
-            powers,
             roots,
         }
-    }
-
-    fn columns(&self, first: usize, count: usize) -> ArrayView2<'_, f64> {
-        self.all
-            .slice_axis(Axis(1), Slice::from(first..first + count))
     }
 
     /// The direction along which, or across which, most varies.
     fn direction(&self, targets: &Array2<f64>) -> Result<Features> {
         let weights = solved(&self.all, targets)?;
+        let powers = self.roots.ncols();
         let amplitude = |first: usize| {
-            let own = Slice::from(first..first + self.powers);
+            let own = Slice::from(first..first + powers);
             self.roots.dot(&weights.column(0).slice_axis(Axis(0), own))
         };
         let (cos, sin) = (
             amplitude(self.isotropic),
-            amplitude(self.isotropic + self.powers),
+            amplitude(self.isotropic + powers),
         );
         let (same, product) = (cos.dot(&cos) - sin.dot(&sin), 2.0 * cos.dot(&sin));
         // Twice the azimuth is the axis of these pairs of amplitudes, and an axis half the angle of its

@@ -81,10 +81,7 @@ impl Survey {
                     }
                 };
                 let turned = |node: &Node| of(node).turned(features.azimuth());
-                let pairs: Vec<DirectionPair> = match features.is_isotropic() {
-                    true => nodes.iter().map(of).collect(),
-                    false => nodes.iter().map(turned).collect(),
-                };
+                let pairs: Vec<DirectionPair> = nodes.iter().map(turned).collect();
                 let sums = |targets: Array2<f64>| -> Result<Vec<f64>> {
                     Ok(albedo::sums(nodes, link.to_values(targets)?.view()))
                 };
