@@ -1,4 +1,4 @@
-//! The paper's protocol on the 61 materials of the stand-in, with one factorisation per fold for
+//! The paper's protocol on the 61 materials of the synthetic data, with one factorisation per fold for
 //! all materials together against one per fold and material, and against one in all.
 
 use std::hint::black_box;

@@ -58,14 +58,14 @@ pub fn processor_seconds_per_call(least_seconds: f64, mut work: impl FnMut()) ->
     }
 }
 
-/// The median; 0 of nothing.
+/// The median; `None` of nothing.
 #[must_use]
-pub fn median(mut values: Vec<f64>) -> f64 {
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let half = values.len() / 2;
     match (values.len() % 2, values.get(half)) {
-        (_, None) => 0.0,
-        (1, Some(&middle)) => middle,
-        (_, Some(&upper)) => f64::midpoint(values[half - 1], upper),
+        (_, None) => None,
+        (1, Some(&middle)) => Some(middle),
+        (_, Some(&upper)) => Some(f64::midpoint(values[half - 1], upper)),
     }
 }

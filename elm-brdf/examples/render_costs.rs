@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Times of growth are medians of three, those of savings single, on one thread; without a folder
-//! the stand-in is used.
+//! the synthetic data is used.
 
 // A program for a terminal.
 #![allow(clippy::print_stdout)]
@@ -50,7 +50,7 @@ fn lights(count: usize, width: u32, height: u32) -> Outcome<Sheet> {
     let mut text = format!(
         "[image]\nwidth = {width}\nheight = {height}\nsamples = 4\n\
          [camera]\nposition = [0, 0, 8]\ntarget = [0, 0, 0]\nheight = 2.2\n\
-         [material.m]\ncuret = '39'\n[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'm'\n"
+         [material.m]\ncuret = '39'\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = 'm'\n"
     );
     for light in 0..count {
         let angle = light as f64;

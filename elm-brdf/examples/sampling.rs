@@ -33,8 +33,8 @@ fn spread(
             (DirectionPair { incident, outgoing }, incident[2] / density)
         })
         .unzip();
-    let colours = material.eval(&pairs)?;
-    let values: Vec<f64> = colours
+    let colors = material.eval(&pairs)?;
+    let values: Vec<f64> = colors
         .iter()
         .zip(&factors)
         .map(|([r, g, b], factor)| (0.2126 * r + 0.7152 * g + 0.0722 * b) * factor)

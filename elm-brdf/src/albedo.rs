@@ -39,8 +39,8 @@ pub(crate) fn nodes(theta: f64) -> Vec<Node> {
     let incident = cartesian(theta, 0.0);
     let mut nodes = Vec::with_capacity(2 * RADII * TURNS);
     // Centres in the plane of the light, by their signed angle from the normal.
-    for (centre, other) in [(-theta, theta), (theta, -theta)] {
-        let (sin_c, cos_c) = centre.sin_cos();
+    for (center, other) in [(-theta, theta), (theta, -theta)] {
+        let (sin_c, cos_c) = center.sin_cos();
         let (sin_o, cos_o) = other.sin_cos();
         for radius in 0..RADII {
             let part = (radius as f64 + 0.5) / RADII as f64;

@@ -167,6 +167,23 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// The one of `all` whose name is `name`, or an error that lists the names of a `what`.
+    pub(crate) fn find<T: Copy, const N: usize>(
+        what: &'static str,
+        name: &str,
+        all: [T; N],
+        name_of: impl Fn(T) -> &'static str,
+    ) -> Result<T> {
+        let found = all.into_iter().find(|&one| name_of(one) == name);
+        found.ok_or_else(|| Self::UnknownName {
+            what,
+            name: name.to_owned(),
+            expected: all.map(name_of).join(", "),
+        })
+    }
+}
+
 impl From<EvalError> for Error {
     fn from(error: EvalError) -> Self {
         let other = match error.downcast() {

@@ -49,7 +49,7 @@ pub enum Features {
     /// $\sqrt{\theta_h} \cos 2(\varphi_h - \varphi)$ and $\sqrt{\theta_h} \sin 2(\varphi_h - \varphi)$: turns
     /// with the surface, for one with a grain along or across $\varphi$, and is the same after half a turn.
     /// Reciprocal.
-    Grain {
+    Anisotropic {
         /// The azimuth $\varphi$ in degrees.
         degrees: u8,
     },
@@ -66,7 +66,7 @@ impl Features {
         Self::Highlight,
         Self::Algebraic,
         Self::HighlightCosines,
-        Self::Grain { degrees: 0 },
+        Self::Anisotropic { degrees: 0 },
     ];
 
     /// The set's name.
@@ -81,7 +81,7 @@ impl Features {
             Self::Highlight => "highlight",
             Self::HighlightCosines => "highlight-cosines",
             Self::Algebraic => "algebraic",
-            Self::Grain { .. } => "grain",
+            Self::Anisotropic { .. } => "anisotropic",
         }
     }
 
@@ -126,7 +126,7 @@ impl Features {
             Self::HighlightCosines => {
                 &["sqrt theta_h", "cos theta_d", "cos theta_i", "cos theta_o"]
             }
-            Self::Grain { .. } => &[
+            Self::Anisotropic { .. } => &[
                 "sqrt theta_h",
                 "cos theta_d",
                 "cos theta_i cos theta_o",
@@ -155,14 +155,14 @@ impl Features {
     /// Whether turning the surface about its normal changes no input.
     #[must_use]
     pub fn is_isotropic(self) -> bool {
-        !matches!(self, Self::Grain { .. })
+        !matches!(self, Self::Anisotropic { .. })
     }
 
     /// The azimuth in radians that inputs count from.
     #[must_use]
     pub fn azimuth(self) -> f64 {
         match self {
-            Self::Grain { degrees } => f64::from(degrees).to_radians(),
+            Self::Anisotropic { degrees } => f64::from(degrees).to_radians(),
             _ => 0.0,
         }
     }
@@ -170,15 +170,15 @@ impl Features {
     /// The same set for a grain along x.
     pub(crate) fn along_x(self) -> Self {
         match self {
-            Self::Grain { .. } => Self::Grain { degrees: 0 },
+            Self::Anisotropic { .. } => Self::Anisotropic { degrees: 0 },
             other => other,
         }
     }
 
     /// The inputs of each pair of directions, shape (pairs, inputs).
     ///
-    /// All sets but [`Grain`](Self::Grain) depend on the angles $\theta_i$, $\theta_o$ and $|\varphi_i -
-    /// \varphi_o|$ alone, as an isotropic surface does. Finite for every pair of unit vectors, those below
+    /// All sets but [`Anisotropic`](Self::Anisotropic) depend on the angles $\theta_i$, $\theta_o$ and
+    /// $|\varphi_i - \varphi_o|$ alone, as an isotropic surface does. Finite for every pair of unit vectors, those below
     /// the horizon, grazing or coincident included.
     #[must_use]
     pub fn compute(self, pairs: &[DirectionPair]) -> Array2<f64> {
@@ -198,7 +198,7 @@ impl Features {
                 Self::Highlight => fill(row, &highlight(pair)),
                 Self::HighlightCosines => fill(row, &highlight_cosines(pair)),
                 Self::Algebraic => fill(row, &algebraic(pair)),
-                Self::Grain { .. } => fill(row, &grain(pair, self.azimuth())),
+                Self::Anisotropic { .. } => fill(row, &anisotropic(pair, self.azimuth())),
             }
         }
         out
@@ -280,7 +280,7 @@ fn highlight(pair: &DirectionPair) -> [f64; 4] {
     ]
 }
 
-fn grain(pair: &DirectionPair, azimuth: f64) -> [f64; 6] {
+fn anisotropic(pair: &DirectionPair, azimuth: f64) -> [f64; 6] {
     let [root, cos_d, product, sum] = highlight(pair);
     let pair = pair.turned(-azimuth);
     let (l, v) = (pair.incident, pair.outgoing);
@@ -327,14 +327,7 @@ impl FromStr for Features {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|set| set.name() == name)
-            .ok_or_else(|| Error::UnknownName {
-                what: "feature set",
-                name: name.to_owned(),
-                expected: Self::ALL.map(Self::name).join(", "),
-            })
+        Error::find("feature set", name, Self::ALL, Self::name)
     }
 }
 
@@ -378,7 +371,7 @@ mod tests {
                 &[FRAC_PI_3.sqrt(), 1.0, 0.5, 0.5],
             ),
             (
-                Features::Grain { degrees: 0 },
+                Features::Anisotropic { degrees: 0 },
                 // The half vector's azimuth is 0.4.
                 &[
                     FRAC_PI_3.sqrt(),
@@ -453,7 +446,7 @@ mod tests {
                     Features::Highlight
                         | Features::HighlightCosines
                         | Features::Algebraic
-                        | Features::Grain { .. }
+                        | Features::Anisotropic { .. }
                 );
                 let tolerance = if has_root { moved.sqrt() } else { moved };
                 // A grain looks the same after half a turn.

@@ -6,7 +6,7 @@
 //! > Engineering 7(3), 2017.
 //!
 //! Data run one way: measurements ([`elm_datasets`]) to network inputs ([`features`]) and targets
-//! ([`link`]), through a network ([`elm`]) to a reflectance model ([`model`]), which
+//! ([`target_transform`]), through a network ([`elm`]) to a reflectance model ([`model`]), which
 //! cross-validation ([`protocol`]) judges beside what the paper printed ([`published`]).
 //!
 //! Of the features `cli` (the program `elm-brdf`, default) brings `report` (results as tables, files
@@ -43,7 +43,6 @@ mod file;
 pub mod fit;
 #[cfg(feature = "render")]
 pub mod gallery;
-pub mod link;
 pub mod metrics;
 pub mod model;
 pub mod pareto;
@@ -60,7 +59,9 @@ mod scales;
 pub mod scene_materials;
 #[cfg(feature = "render")]
 pub mod scenes;
+mod statistics;
 mod streams;
+pub mod target_transform;
 
 /// The renderer.
 #[cfg(feature = "render")]

@@ -9,6 +9,7 @@ use ndarray::{Array1, ArrayView2, aview1};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use crate::statistics::{deviation, mean};
 use elm_datasets::geometry::DirectionPair;
 
 /// The measure that a fit makes small.
@@ -60,14 +61,7 @@ impl FromStr for Metric {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|metric| metric.name() == name)
-            .ok_or_else(|| Error::UnknownName {
-                what: "metric",
-                name: name.to_owned(),
-                expected: Self::ALL.map(Self::name).join(", "),
-            })
+        Error::find("metric", name, Self::ALL, Self::name)
     }
 }
 
@@ -153,21 +147,14 @@ impl Metrics {
     /// The mean of each measure over those that have it; `None` of none.
     #[must_use]
     pub fn mean(all: &[Self]) -> Option<Self> {
-        Self::each(all, |values| {
-            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-        })
+        Self::each(all, |values| mean(values.iter().copied()))
     }
 
     /// The standard deviation of each measure over those that have it, with one less than their
     /// number for a divisor; `None` of fewer than two.
     #[must_use]
     pub fn deviation(all: &[Self]) -> Option<Self> {
-        Self::each(all, |values| {
-            let count = values.len() as f64;
-            let mean = values.iter().sum::<f64>() / count;
-            let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-            (values.len() > 1).then(|| (squares / (count - 1.0)).sqrt())
-        })
+        Self::each(all, deviation)
     }
 
     /// `summary` of the values of each measure.

@@ -32,9 +32,9 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::fit::{Fit, check};
-use crate::link::Link;
 use crate::metrics::Metrics;
 use crate::model::{BrdfModel, Draw, Layer};
+use crate::target_transform::TargetTransform;
 use elm_datasets::geometry::DirectionPair;
 
 /// How a [`Prior`] is built.
@@ -141,7 +141,9 @@ impl PriorParams {
         let params = self.params(x.ncols()).feature_map().clone();
         let map = FeatureMap::new(Some(scaler), params.draw(x.ncols())?, false)?;
         let h = map.transform(&x)?;
-        let targets = Link::default_log().fit(values)?.to_targets(values)?;
+        let targets = TargetTransform::default_log()
+            .fit(values)?
+            .to_targets(values)?;
         let problem = LeastSquares::new(&h, &targets)?.with_intercept(true);
         let solution = Solver::from(Ridge::relative(SMOOTHING)).solve(&problem)?;
         let mut prior = Prior {
@@ -158,7 +160,7 @@ impl PriorParams {
             },
             source: String::new(),
         };
-        prior.centre();
+        prior.center();
         Ok(prior)
     }
 
@@ -167,7 +169,7 @@ impl PriorParams {
         // of 1.
         let third = self.neurons / 3;
         let phase = Biases::Scaled(std::f64::consts::PI);
-        let waves = |scale: f64| {
+        let sine_features = |scale: f64| {
             NeuronGroup::new(third, Activation::Sine)
                 .with_scale(scale)
                 .with_biases(phase)
@@ -181,13 +183,15 @@ impl PriorParams {
         if third == 0 {
             return params;
         }
-        params.with_group(waves(0.3)).with_group(waves(3.0))
+        params
+            .with_group(sine_features(0.3))
+            .with_group(sine_features(3.0))
     }
 }
 
 impl Prior {
     /// From the weights of materials in `deviations` to mean and deviations.
-    fn centre(&mut self) {
+    fn center(&mut self) {
         let Weights { beta, constant } = &mut self.deviations;
         let count = beta.ncols() as f64;
         let mean = beta.sum_axis(Axis(1)) / count;
@@ -225,7 +229,7 @@ impl Prior {
             deviations: Weights { beta, constant },
             ..self.clone()
         };
-        prior.centre();
+        prior.center();
         Ok(prior)
     }
 
@@ -260,8 +264,8 @@ impl Prior {
     ) -> Result<BrdfModel> {
         let mut left_out = Array2::zeros(values.dim());
         let model = self.fit_judged(pairs, values, Some(&mut left_out))?;
-        let link = model.link();
-        let predicted = link.to_values(link.to_targets(values)? - left_out)?;
+        let transform = model.target_transform();
+        let predicted = transform.to_values(transform.to_targets(values)? - left_out)?;
         let mut about = model.provenance().clone();
         about.held_out = Some(Metrics::of(pairs, predicted.view(), values)?);
         Ok(model.with_provenance(about))
@@ -278,8 +282,8 @@ impl Prior {
         check(pairs, values)?;
         let x = self.features.compute(pairs);
         let h = self.map.transform(&x)?;
-        let link = Link::default_log().fit(values)?;
-        let targets = link.to_targets(values)?;
+        let transform = TargetTransform::default_log().fit(values)?;
+        let targets = transform.to_targets(values)?;
         let level = h.dot(&self.mean.beta) + self.mean.constant[0];
         let rest = &targets - &level.insert_axis(Axis(1));
         let taught = h.dot(&self.deviations.beta) + &self.deviations.constant;
@@ -328,7 +332,7 @@ impl Prior {
             kept: None,
             scales: 0,
         }]);
-        let mut model = BrdfModel::new(self.features, link, layer, network);
+        let mut model = BrdfModel::new(self.features, transform, layer, network);
         let mut about = model.provenance().clone();
         about.rows = pairs.len();
         about.prior = Some(self.source.clone());

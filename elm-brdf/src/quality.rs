@@ -196,7 +196,7 @@ mod tests {
 
     #[test]
     fn the_noise_floor_finds_the_noise_put_in() {
-        // The stand-in's material 13 and its like are dark; 5 is matte, with 4.1 % of noise.
+        // The synthetic material 13 and its like are dark; 5 is matte, with 4.1 % of noise.
         let data = synthetic::measurements(1, &[MaterialId::new(5).unwrap()], Invalid::Keep);
         let pairs = &data.directions;
         let red = data.materials[0].values.column(0);

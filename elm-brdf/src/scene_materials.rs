@@ -21,9 +21,9 @@ use crate::error::{Error, Result};
 use crate::export::check_precision;
 use crate::features::Features;
 use crate::fit::{Model, boxed};
-use crate::link::Link;
 use crate::model::BrdfModel;
 use crate::recipes::{self, Recipe};
+use crate::target_transform::TargetTransform;
 
 /// A scene whose materials are described by [`MaterialTable`]s.
 pub type Scene = elm_brdf_render::Scene<MaterialTable>;
@@ -35,7 +35,7 @@ pub type Sheet = elm_brdf_render::Sheet<MaterialTable>;
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialTable {
-    /// A material of CUReT, by number or name; of the stand-in if CUReT's files are not at hand.
+    /// A material of CUReT, by number or name; of the synthetic data if CUReT's files are not at hand.
     pub curet: Option<String>,
     /// Measurements in a CSV file, or in another that `fit` reads.
     pub csv: Option<PathBuf>,
@@ -80,7 +80,7 @@ pub struct MaterialTable {
     pub conserve_energy: bool,
 }
 
-/// A model and where it comes from, in a word: "CUReT", "stand-in", a file's name, "analytic".
+/// A model and where it comes from, in a word: "CUReT", "synthetic", a file's name, "analytic".
 pub struct Fitted {
     /// The model.
     pub model: Box<dyn Model>,
@@ -92,10 +92,10 @@ pub struct Fitted {
     pub notes: Vec<String>,
 }
 
-/// Models fitted to CUReT's files, to the stand-in or to files of one's own, saved models, measured
+/// Models fitted to CUReT's files, to the synthetic data or to files of one's own, saved models, measured
 /// tables, and formulas. What was made once is used again for the same table.
 pub struct SceneMaterialLoader {
-    /// Folder of CUReT's files; `None` for the stand-in.
+    /// Folder of CUReT's files; `None` for the synthetic data.
     curet: Option<PathBuf>,
     /// What fits a network, `fit = "elm"`.
     network: Box<Recipe>,
@@ -115,11 +115,11 @@ struct Made {
     notes: Vec<String>,
 }
 
-/// The stand-in's seed.
-const STAND_IN_SEED: u64 = 1;
+/// The seed of the synthetic data.
+const SYNTHETIC_SEED: u64 = 1;
 
 impl SceneMaterialLoader {
-    /// With CUReT's files in a folder, or with the stand-in, and the networks of
+    /// With CUReT's files in a folder, or with the synthetic data, and the networks of
     /// [`recipes::network`].
     #[must_use]
     pub fn new(curet: Option<PathBuf>) -> Self {
@@ -180,7 +180,7 @@ impl SceneMaterialLoader {
             Some("interpolation") => {
                 let interpolation = baselines::RadialBasis {
                     features: Features::ReciprocalCosines,
-                    link: Link::default_log(),
+                    transform: TargetTransform::default_log(),
                     radial: baselines::Radial::ThinPlate,
                     smoothing: baselines::Smoothing::Exact,
                 };
@@ -209,18 +209,18 @@ impl SceneMaterialLoader {
         })
     }
 
-    /// The measurements of a material of CUReT or of the stand-in, and what a caption calls them.
+    /// The measurements of a material of CUReT or of the synthetic data, and what a caption calls them.
     fn measurements(&self, name: &str) -> Result<(Measurements, &'static str)> {
         let id = match (&self.curet, name.parse()) {
-            // A scene made for CUReT renders with the stand-in too, which has names of its own.
+            // A scene made for CUReT renders with the synthetic data too, which has names of its own.
             (None, Err(_)) => synthetic::find(name)?,
             (_, found) => found?,
         };
         Ok(match &self.curet {
             Some(dir) => (curet::read(dir, &[id], Invalid::Clamp)?, "CUReT"),
             None => (
-                synthetic::measurements(STAND_IN_SEED, &[id], Invalid::Clamp),
-                "the synthetic stand-in",
+                synthetic::measurements(SYNTHETIC_SEED, &[id], Invalid::Clamp),
+                "synthetic data",
             ),
         })
     }

@@ -18,7 +18,7 @@ const COMPARED: [usize; 3] = [1, 15, 25];
 /// - `comparison`: interpolated, fitted and analytic side by side, with the differences;
 /// - `mesh`: a torus knot in a studio.
 ///
-/// `material`, a number or name of CUReT or of the stand-in, takes the place of the one material
+/// `material`, a number or name of CUReT or of the synthetic data, takes the place of the one material
 /// of `contact-sheet` and `mesh`, and of the three of `comparison`.
 ///
 /// # Errors
@@ -110,7 +110,7 @@ fn materials() -> String {
         let _ = write!(
             text,
             "[material.m{id:02}]\ncuret = '{id}'\n\
-             [[sphere]]\ncentre = [{x}, {y}, 0]\nradius = 1.12\nmaterial = 'm{id:02}'\n\
+             [[sphere]]\ncenter = [{x}, {y}, 0]\nradius = 1.12\nmaterial = 'm{id:02}'\n\
              label = '{{name}}'\n"
         );
     }
@@ -154,7 +154,7 @@ height = 2.3
 curet = SUBJECT
 
 [[sphere]]
-centre = [0, 0, 0]
+center = [0, 0, 0]
 radius = 1
 material = 'subject'
 
@@ -179,7 +179,7 @@ curet = SUBJECT
 fit = 'FIT'
 
 [[sphere]]
-centre = [0, 0, 0]
+center = [0, 0, 0]
 radius = 1
 material = 'subject'
 

@@ -43,7 +43,7 @@ fn the_models_asked_for_are_judged_and_the_best_comes_first() {
             .iter()
             .all(|m| m["floats_per_channel"].as_u64().unwrap() > 0)
     );
-    // The stand-in is no measurement, so there is nothing to set beside the paper.
+    // The synthetic data is no measurement, so there is nothing to set beside the paper.
     assert!(models.iter().all(|m| m["rmse_ratio_to_paper"].is_null()));
 }
 

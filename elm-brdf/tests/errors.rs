@@ -31,7 +31,7 @@ fn refused(arguments: &[&str], code: i32, expected: &[&str]) {
     }
 }
 
-/// A folder of the stand-in's files after `damage`.
+/// A folder of the synthetic files after `damage`.
 fn damaged(damage: impl FnOnce(&Path)) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let all: Vec<MaterialId> = MaterialId::all().collect();

@@ -20,8 +20,8 @@ use elm::{Activation, ElmParams};
 use elm_brdf::export::{ExportError, Format, Language, merl, source};
 use elm_brdf::features::Features;
 use elm_brdf::fit::Fit;
-use elm_brdf::link::Link;
 use elm_brdf::model::{BrdfModel, BrdfParams};
+use elm_brdf::target_transform::TargetTransform;
 use elm_datasets::Brdf;
 use elm_datasets::brdf::EvalError;
 use elm_datasets::geometry::DirectionPair;
@@ -272,9 +272,9 @@ fn shaders_run_in_a_browser_agree_with_the_model() {
 }
 
 /// A formula of one channel.
-struct Grey;
+struct Gray;
 
-impl Brdf for Grey {
+impl Brdf for Gray {
     fn channels(&self) -> usize {
         1
     }
@@ -294,7 +294,7 @@ impl Brdf for Grey {
 #[test]
 fn merl_tables_hold_the_models_values_at_the_middle_of_every_cell() {
     let dir = tempfile::tempdir().unwrap();
-    for model in [models().remove(6).1, Box::new(Grey)] {
+    for model in [models().remove(6).1, Box::new(Gray)] {
         let path = dir.path().join("model.binary");
         merl(&*model).unwrap().write(&path).unwrap();
         let table = Merl::read(&path).unwrap();
@@ -326,7 +326,7 @@ fn what_cannot_be_exported_is_an_error_of_its_own() {
     let model = |network: ElmParams<f64>| {
         let params = BrdfParams {
             features: Features::Cosines,
-            link: Link::default_log(),
+            transform: TargetTransform::default_log(),
             network,
         };
         params.fit(pairs, samples.values.view()).unwrap()

@@ -73,8 +73,8 @@ A <A HREF="/curet/data/table.txt">table</A> is provided. The ascii file
 give the red, green and blue. <a href="http://[broken">x</a> <a href="bad link/abrdf.dat">x</a>
 "#;
 
-/// The files of the stand-in, in the database's layout.
-fn stand_in() -> Vec<(String, Vec<u8>)> {
+/// The files of the synthetic data, in the database's layout.
+fn synthetic_files() -> Vec<(String, Vec<u8>)> {
     let dir = tempfile::tempdir().unwrap();
     let all: Vec<MaterialId> = MaterialId::all().collect();
     let mut set = synthetic::measurements(1, &all, Invalid::Keep);
@@ -125,7 +125,7 @@ fn try_fetch(answers: Answers, dir: &Path, changed: Changed) -> Result<Vec<Fetch
 
 #[test]
 fn all_five_files_are_fetched_from_relative_and_absolute_links_of_one_page() {
-    let files = stand_in();
+    let files = synthetic_files();
     let dir = tempfile::tempdir().unwrap();
     let to = dir.path().join("deep/curet");
     let fetched = try_fetch(site(&files), &to, Changed::Accept).unwrap();
@@ -145,7 +145,7 @@ fn all_five_files_are_fetched_from_relative_and_absolute_links_of_one_page() {
 
 #[test]
 fn redirects_are_followed_and_links_are_relative_to_where_they_end() {
-    let mut answers = site(&stand_in());
+    let mut answers = site(&synthetic_files());
     answers.insert("/old".to_owned(), moved("/curet/html/brdfm.html"));
     let file = answers.remove("/curet/data/rbrdf.dat").unwrap();
     answers.insert("/curet/data/rbrdf.dat".to_owned(), moved("../new/r.dat"));
@@ -173,7 +173,7 @@ fn a_circle_of_redirects_ends_in_an_error() {
 
 #[test]
 fn a_table_of_another_name_is_known_by_the_words_of_its_link() {
-    let mut answers = site(&stand_in());
+    let mut answers = site(&synthetic_files());
     let table = answers.remove("/curet/data/table.txt").unwrap();
     answers.insert("/curet/data/angles".to_owned(), table);
     let page = PAGE.replace("/curet/data/table.txt", "../data/angles");
@@ -211,7 +211,7 @@ const FAULTS: &[(&str, Edit, &[&str])] = &[
 
 #[test]
 fn faults_are_reported_with_the_address_and_nothing_is_written() {
-    let files = stand_in();
+    let files = synthetic_files();
     for (what, edit, fragments) in FAULTS {
         let mut answers = site(&files);
         edit(&mut answers);
@@ -236,7 +236,7 @@ fn faults_are_reported_with_the_address_and_nothing_is_written() {
 fn a_file_with_another_sum_is_refused_and_the_old_ones_stay() {
     let dir = tempfile::tempdir().unwrap();
     fs::write(dir.path().join("table.txt"), "old").unwrap();
-    let error = try_fetch(site(&stand_in()), dir.path(), Changed::Refuse).unwrap_err();
+    let error = try_fetch(site(&synthetic_files()), dir.path(), Changed::Refuse).unwrap_err();
     assert!(matches!(error, Error::Changed { .. }), "{error}");
     assert_eq!(fs::read(dir.path().join("table.txt")).unwrap(), b"old");
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
@@ -276,7 +276,7 @@ fn addresses_that_cannot_be_asked_are_named() {
 #[test]
 fn progress_goes_from_the_page_to_the_last_file() {
     let dir = tempfile::tempdir().unwrap();
-    let page = format!("{}/curet/html/brdfm.html", start(site(&stand_in())));
+    let page = format!("{}/curet/html/brdfm.html", start(site(&synthetic_files())));
     let mut seen = Vec::new();
     fetch::curet(&page, dir.path(), Changed::Accept, |progress| {
         seen.push(progress);
@@ -312,7 +312,7 @@ fn the_real_files_have_the_sums_known() {
 
 #[test]
 fn reproduce_uses_what_fetch_has_put_into_the_cache() {
-    let page = format!("{}/curet/html/brdfm.html", start(site(&stand_in())));
+    let page = format!("{}/curet/html/brdfm.html", start(site(&synthetic_files())));
     let program = Program::new();
     let assert = program
         .command()
@@ -339,7 +339,7 @@ fn reproduce_uses_what_fetch_has_put_into_the_cache() {
 
 #[test]
 fn the_command_says_in_one_line_what_is_wrong() {
-    let page = format!("{}/curet/html/brdfm.html", start(site(&stand_in())));
+    let page = format!("{}/curet/html/brdfm.html", start(site(&synthetic_files())));
     let gone = format!("{}/gone", serve(Answers::new()));
     for (arguments, code, fragments) in [
         (

@@ -12,7 +12,7 @@ use elm_datasets::{Invalid, MaterialId, synthetic};
 use serde_json::Value;
 use support::Program;
 
-/// Writes every `step`-th measurement of one of the stand-in's materials, in degrees.
+/// Writes every `step`-th measurement of one of the synthetic materials, in degrees.
 fn samples(path: &Path, material: usize, first: usize, step: usize) {
     let data = synthetic::measurements(1, &[MaterialId::new(material).unwrap()], Invalid::Clamp);
     let mut text = String::from("theta_i,phi_i,theta_o,phi_o,red,green\n");

@@ -116,7 +116,7 @@ fn middle(picture: &Path) -> [u8; 3] {
 
 const SCENE: &str = "[image]\nwidth = 16\nheight = 16\nsamples = 4\n\
     [camera]\nposition = [0, 0, 6]\ntarget = [0, 0, 0]\nfov = 22\n\
-    [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'm'\n\
+    [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = 'm'\n\
     [environment]\nradiance = [1, 1, 1]\nvisible = false\n\
     [material.m]\n";
 

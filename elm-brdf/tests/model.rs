@@ -11,9 +11,9 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use elm_brdf::features::Features;
-use elm_brdf::link::Link;
 use elm_brdf::metrics::{Metric, Metrics};
 use elm_brdf::model::{BrdfModel, BrdfParams, Tuned};
+use elm_brdf::target_transform::TargetTransform;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::{DirectionPair, cartesian};
 
@@ -115,7 +115,7 @@ fn a_metallic_paint_from_one_in_a_hundred_thousand_to_six_hundred_is_met_over_it
         .unwrap();
     let pairs = &test.directions;
     let predicted = model.eval(pairs).unwrap();
-    let ceiling = Link::HEADROOM * train.values.iter().copied().fold(0.0, f64::max);
+    let ceiling = TargetTransform::HEADROOM * train.values.iter().copied().fold(0.0, f64::max);
     assert!(predicted.iter().all(|&v| (0.0..=ceiling).contains(&v)));
     let errors = Metrics::of(pairs, predicted.view(), test.values.view()).unwrap();
     // Of logarithms: black is off by the mean of all, and a constant by half of that at best.
@@ -160,7 +160,7 @@ fn kinds() -> Vec<BrdfModel> {
     let paint = paint::samples(3200, 1).unwrap();
     let params = |network: ElmParams<f64>| BrdfParams {
         features: Features::HalfDiff,
-        link: Link::CubeRoot,
+        transform: TargetTransform::CubeRoot,
         network,
     };
     let plain = ElmParams::new(20).with_activation(Activation::Tanh);

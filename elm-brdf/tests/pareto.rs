@@ -74,7 +74,7 @@ fn results(dir: &Path) -> Vec<Value> {
 }
 
 #[test]
-fn the_stand_in_s_materials_are_weighed_and_the_front_is_named() {
+fn the_synthetic_materials_are_weighed_and_the_front_is_named() {
     let program = Program::new();
     let out = program.cache().join("out");
     let arguments = [
@@ -103,7 +103,7 @@ fn the_stand_in_s_materials_are_weighed_and_the_front_is_named() {
     for point in list.iter().filter(|point| point["on_front"] == true) {
         assert!(text.contains(point["model"].as_str().unwrap()), "{text}");
     }
-    assert!(text.contains("stand-in"), "{text}");
+    assert!(text.contains("synthetic"), "{text}");
 }
 
 #[test]

@@ -7,9 +7,9 @@ use elm::{Activation, ElmParams};
 use elm_brdf::batch::Packed;
 use elm_brdf::export::{ExportError, Language, source};
 use elm_brdf::features::Features;
-use elm_brdf::link::Link;
 use elm_brdf::metrics::Metrics;
 use elm_brdf::model::{BrdfModel, BrdfParams};
+use elm_brdf::target_transform::TargetTransform;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::{DirectionPair, cartesian};
 use elm_datasets::{Invalid, MaterialId, synthetic};
@@ -22,7 +22,7 @@ fn model(lambda: f64) -> BrdfModel {
     let samples = data.samples(0).unwrap();
     let params = BrdfParams {
         features: Features::ReciprocalCosines,
-        link: Link::default_log(),
+        transform: TargetTransform::default_log(),
         network: ElmParams::new(120)
             .with_activation(Activation::Sine)
             .with_scale(0.05)

@@ -11,7 +11,7 @@ use elm_datasets::geometry::DirectionPair;
 use elm_datasets::{Invalid, MaterialId, synthetic};
 use ndarray::{Array2, Axis, concatenate, s};
 
-/// The first channel of these of the stand-in's materials, side by side.
+/// The first channel of these of the synthetic materials, side by side.
 fn materials(numbers: impl Iterator<Item = usize>) -> (Vec<DirectionPair>, Array2<f64>) {
     let ids: Vec<MaterialId> = numbers.map(|n| MaterialId::new(n).unwrap()).collect();
     let data = synthetic::measurements(1, &ids, Invalid::Clamp);
@@ -87,7 +87,7 @@ fn what_is_fitted_with_a_prior_is_one_network_of_its_layer() {
     let model = prior.fit_model(&pairs[..40], two).unwrap();
     assert_eq!(model.network().hidden().neurons(), 90);
     assert_eq!(model.channels(), 2);
-    // Weights, constant and link of each channel, four means and factors.
+    // Weights, constant and transform of each channel, four means and factors.
     assert_eq!(model.stored_floats(), 2 * (90 + 1 + 2) + 8);
     let at_once = model.eval(&pairs).unwrap();
     let alone = prior

@@ -34,7 +34,7 @@ fn head(width: u32, height: u32, more: &str) -> String {
 
 const SPHERE: &str = "
 [[sphere]]
-centre = [0, 0, 0]
+center = [0, 0, 0]
 radius = 1
 material = 'm'
 ";
@@ -62,7 +62,7 @@ curet = '7'
 [material.unused]
 curet = '8'
 [[sphere]]
-centre = [-0.8, 0, 0]
+center = [-0.8, 0, 0]
 radius = 0.8
 material = 'learnt'
 [[mesh]]
@@ -259,10 +259,10 @@ fn of_61_materials_only_the_3_that_are_seen_are_made() {
         text += &format!("[material.m{id}]\ncuret = '{id}'\n");
     }
     for (id, x) in [(5, -2.0), (20, 0.0), (33, 2.0)] {
-        text += &format!("[[sphere]]\ncentre = [{x}, 0, 0]\nradius = 0.9\nmaterial = 'm{id}'\n");
+        text += &format!("[[sphere]]\ncenter = [{x}, 0, 0]\nradius = 0.9\nmaterial = 'm{id}'\n");
     }
     // Hidden behind the sphere in the middle.
-    text += "[[sphere]]\ncentre = [0, 0, -3]\nradius = 0.5\nmaterial = 'm40'\n";
+    text += "[[sphere]]\ncenter = [0, 0, -3]\nradius = 0.5\nmaterial = 'm40'\n";
     let account = picture(&text, Optimizations::ALL, 2).unwrap().account;
     let used: Vec<&str> = account.materials_used.keys().map(String::as_str).collect();
     assert_eq!(
@@ -294,7 +294,7 @@ fn impossible_scenes_are_errors_of_one_line_that_name_the_place() {
             "scene.toml, line 3: ",
         ),
         (
-            with("", "[[sphere]]\ncentre = [0, 0]\n"),
+            with("", "[[sphere]]\ncenter = [0, 0]\n"),
             "scene.toml, line 12: ",
         ),
         (with("samplez = 3", ""), "line 4: unknown field `samplez`"),

@@ -19,8 +19,8 @@ fn check_schema(report: &Value) {
     support::check_schema("reproduce", report);
 }
 
-/// A folder in CUReT's layout, filled by the stand-in.
-fn stand_in_folder() -> tempfile::TempDir {
+/// A folder in CUReT's layout, filled by the synthetic data.
+fn synthetic_folder() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let all: Vec<MaterialId> = MaterialId::all().collect();
     curet::write(dir.path(), &synthetic::measurements(1, &all, Invalid::Keep)).unwrap();
@@ -28,7 +28,7 @@ fn stand_in_folder() -> tempfile::TempDir {
 }
 
 #[test]
-fn without_data_the_stand_in_is_used_and_every_caption_says_so() {
+fn without_data_the_synthetic_data_is_used_and_every_caption_says_so() {
     let text = Program::new().output(&["reproduce"]);
     assert!(text.lines().next().unwrap().contains("SYNTHETIC"), "{text}");
     let captions: Vec<&str> = text
@@ -47,7 +47,7 @@ fn without_data_the_stand_in_is_used_and_every_caption_says_so() {
 }
 
 #[test]
-fn the_stand_in_gives_json_by_the_schema_without_paper_figures() {
+fn the_synthetic_data_gives_json_by_the_schema_without_paper_figures() {
     let report = json(&Program::new().output(&["reproduce", "--format", "json"]));
     check_schema(&report);
     assert_eq!(report["data"]["synthetic"], true);
@@ -135,8 +135,8 @@ fn a_metric_that_does_not_exist_is_null() {
 }
 
 #[test]
-fn the_stand_in_read_back_from_files_gives_the_same_figures() {
-    let (dir, program) = (stand_in_folder(), Program::new());
+fn the_synthetic_data_read_back_from_files_gives_the_same_figures() {
+    let (dir, program) = (synthetic_folder(), Program::new());
     let arguments = ["reproduce", "--materials", "all", "--format", "json"];
     let direct = json(&program.output(&arguments));
     let with_data = [&arguments[..], &["--data", dir.path().to_str().unwrap()]].concat();
@@ -272,7 +272,7 @@ fn pictures_are_drawn_where_asked_for() {
 
 #[test]
 fn data_are_looked_for_in_the_argument_then_the_variable_then_the_cache() {
-    let (dir, program) = (stand_in_folder(), Program::new());
+    let (dir, program) = (synthetic_folder(), Program::new());
     let nowhere = program.cache().join("nowhere");
     let source = |command: &mut assert_cmd::Command| {
         let output = command

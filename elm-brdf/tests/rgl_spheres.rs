@@ -39,8 +39,8 @@ fn psnr(picture: &[[f64; 3]], reference: &[[f64; 3]]) -> f64 {
     let scale = 0.8 / percentile;
     let (mut sum, mut count) = (0.0, 0.0);
     for (index, (p, q)) in picture.iter().zip(reference).enumerate() {
-        let centre = |k: usize| (k as f64 + 0.5) / 128.0 - 1.0;
-        let (x, y) = (centre(index % 256), centre(index / 256));
+        let center = |k: usize| (k as f64 + 0.5) / 128.0 - 1.0;
+        let (x, y) = (center(index % 256), center(index / 256));
         if x * x + y * y < 1.0 {
             for channel in 0..3 {
                 sum += (srgb(scale * p[channel]) - srgb(scale * q[channel])).powi(2);
@@ -65,7 +65,7 @@ height = 2
 csv = '{material}_train.csv'
 {fit}
 [[sphere]]
-centre = [0, 0, 0]
+center = [0, 0, 0]
 radius = 1
 material = 'm'
 [[directional]]

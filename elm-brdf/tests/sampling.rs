@@ -14,11 +14,11 @@ use std::sync::LazyLock;
 use elm::{Activation, ElmParams, solve::Ridge};
 use elm_brdf::features::Features;
 use elm_brdf::fit::Fit;
-use elm_brdf::link::Link;
 use elm_brdf::model::BrdfParams;
 use elm_brdf::registry;
 use elm_brdf::render::{Material, MaterialLoader, Optimizations, Options, render, testing};
 use elm_brdf::scene_materials::{MaterialTable, Scene, SceneMaterialLoader};
+use elm_brdf::target_transform::TargetTransform;
 use elm_datasets::curet::MATERIALS;
 use elm_datasets::geometry::{DirectionPair, cartesian};
 use elm_datasets::lobes::Formula;
@@ -28,7 +28,7 @@ use networks::library;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Models of every third material of CUReT's files, or of the stand-in, with their numbers.
+/// Models of every third material of CUReT's files, or of the synthetic data, with their numbers.
 fn fitted(curet: Option<&Path>) -> Vec<(usize, Material)> {
     let library = SceneMaterialLoader::new(curet.map(PathBuf::from));
     (1..=MATERIALS)
@@ -45,8 +45,8 @@ fn fitted(curet: Option<&Path>) -> Vec<(usize, Material)> {
         .collect()
 }
 
-/// Fitted to the stand-in, by the usual recipe.
-static STAND_IN: LazyLock<Vec<(usize, Material)>> = LazyLock::new(|| fitted(None));
+/// Fitted to the synthetic data, by the usual recipe.
+static SYNTHETIC: LazyLock<Vec<(usize, Material)>> = LazyLock::new(|| fitted(None));
 
 /// Fitted to CUReT's files; `None` where these are not found.
 static CURET: LazyLock<Option<Vec<(usize, Material)>>> =
@@ -79,7 +79,7 @@ fn draws_follow_their_density(materials: &[(usize, Material)]) {
 
 #[test]
 fn directions_drawn_from_every_fitted_material_follow_their_density_by_the_chi_square_test() {
-    draws_follow_their_density(&STAND_IN);
+    draws_follow_their_density(&SYNTHETIC);
 }
 
 #[test]
@@ -125,7 +125,7 @@ fn albedos_agree(materials: &[(usize, Material)]) {
 
 #[test]
 fn in_a_white_furnace_every_fitted_material_sends_its_albedo_whichever_way_it_is_found() {
-    albedos_agree(&STAND_IN);
+    albedos_agree(&SYNTHETIC);
 }
 
 #[test]
@@ -198,7 +198,7 @@ fn every_kind() -> Vec<(String, Box<dyn Brdf>, bool)> {
     for features in Features::ALL {
         let params = BrdfParams {
             features,
-            link: Link::default_log(),
+            transform: TargetTransform::default_log(),
             network: ElmParams::new(40)
                 .with_activation(Activation::Tanh)
                 .with_solver(Ridge::leave_one_out()),
@@ -252,7 +252,7 @@ height = 2
 curet = '7'
 [environment]
 [[sphere]]
-centre = [0, 0, 0]
+center = [0, 0, 0]
 radius = 1
 material = 'm'
 ";
@@ -301,7 +301,7 @@ roughness = 0.25
 {more}
 [environment]
 [[sphere]]
-centre = [0, 0, 0]
+center = [0, 0, 0]
 radius = 1
 material = 'm'
 "

@@ -266,8 +266,8 @@ fn the_size_of_a_network_is_bounded_by_what_was_measured() {
     }
     // Of more than a thousand measured numbers half as many.
     let pairs = scattered(350, 1.4, 14);
-    let grey = measured(plastic, &pairs, 0.01);
-    let values = ndarray::concatenate![Axis(1), grey, grey, grey];
+    let gray = measured(plastic, &pairs, 0.01);
+    let values = ndarray::concatenate![Axis(1), gray, gray, gray];
     let stored = fit(&pairs, &values, 1).stored_floats();
     assert!((300..=525).contains(&stored), "{stored}");
 }

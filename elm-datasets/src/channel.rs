@@ -393,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn names_say_colours_and_wavelengths() {
+    fn names_say_colors_and_wavelengths() {
         for (name, nm) in [
             ("550", 550.0),
             ("550nm", 550.0),

@@ -1,4 +1,4 @@
-//! Measured reflectance from files, a synthetic stand-in for it, and toy regression problems.
+//! Measured reflectance from files, synthetic data like them, and toy regression problems.
 //!
 //! - [`curet`] reads and writes the CUReT database: 61 materials at 205 pairs of directions. The
 //!   database itself is not part of the crate.

@@ -140,7 +140,7 @@ impl FromStr for Invalid {
 pub enum Origin {
     /// Files in CUReT's layout.
     Curet,
-    /// The [stand-in](crate::synthetic), from formulas.
+    /// The [synthetic data](crate::synthetic), from formulas.
     Synthetic {
         /// Seed of the noise.
         seed: u64,

@@ -1,4 +1,4 @@
-//! A stand-in for CUReT, from formulas: for tests, for examples, and for whoever has no files.
+//! Synthetic data like CUReT's, from formulas: for tests, for examples, and for whoever has no files.
 //!
 //! It has CUReT's shape (61 materials, the [rig's](crate::curet::rig) 205 pairs of directions,
 //! red, green and blue, values in steps of 0.001) and noise like CUReT's, but materials of its
@@ -49,13 +49,13 @@ static NAMES: LazyLock<Vec<String>> = LazyLock::new(|| {
         .collect()
 });
 
-/// The name of a material of the stand-in, such as "Matte 01".
+/// The name of a material of the synthetic data, such as "Matte 01".
 #[must_use]
 pub fn name(id: MaterialId) -> &'static str {
     &NAMES[id.index()]
 }
 
-/// Finds a material of the stand-in by its number or by its name, of which only letters and
+/// Finds a material of the synthetic data by its number or by its name, of which only letters and
 /// digits count, in either case.
 ///
 /// # Errors
@@ -141,7 +141,7 @@ impl Family {
 /// The parameters of one material.
 struct Recipe {
     family: Family,
-    colour: [f64; 3],
+    color: [f64; 3],
     sigma: f64,
     alpha: f64,
     lobe: f64,
@@ -166,7 +166,7 @@ impl Recipe {
         ];
         Self {
             family,
-            colour: tint.map(|part| part * brightness),
+            color: tint.map(|part| part * brightness),
             sigma: spread(11.0, 0.0, 0.8),
             alpha: spread(13.0, 0.3, 0.6),
             // Ward: share of light in the lobe. GGX: reflectance head-on of common dielectrics.
@@ -181,18 +181,18 @@ impl Recipe {
     fn evaluate(&self, directions: &DirectionPair) -> [f64; 3] {
         let base = oren_nayar(directions, 1.0, self.sigma);
         match self.family {
-            Family::Matte | Family::Dark => self.colour.map(|albedo| albedo * base),
+            Family::Matte | Family::Dark => self.color.map(|albedo| albedo * base),
             Family::Satin => {
                 let lobe = ward(directions, self.lobe, self.alpha);
-                self.colour.map(|albedo| albedo * base + lobe)
+                self.color.map(|albedo| albedo * base + lobe)
             }
             Family::Gloss => {
                 let lobe = ggx(directions, self.lobe, self.alpha);
-                self.colour
+                self.color
                     .map(|albedo| albedo * (1.0 - self.lobe) * base + lobe)
             }
             // Dimmed, so that the peaks are not far above CUReT's.
-            Family::Lustre => self.colour.map(|f0| ggx(directions, 0.3 * f0, self.alpha)),
+            Family::Lustre => self.color.map(|f0| ggx(directions, 0.3 * f0, self.alpha)),
         }
     }
 }

@@ -10,7 +10,7 @@ use std::fs;
 
 use elm_datasets::error::Layout;
 use elm_datasets::{Angles, Error, Invalid, MaterialId, Origin, curet, synthetic};
-use support::{all, change, stand_in};
+use support::{all, change, synthetic_folder};
 
 /// An edit of a file's lines, without their ends.
 type Edit = fn(&mut Vec<String>);
@@ -65,7 +65,7 @@ fn edit_lines(bytes: Vec<u8>, edit: impl FnOnce(&mut Vec<String>), end: &str) ->
 
 #[test]
 fn damage_is_reported_with_file_line_and_expectation() {
-    let dir = stand_in();
+    let dir = synthetic_folder();
     for (what, file, edit, fragments) in DAMAGE {
         let whole = fs::read(dir.path().join(file)).unwrap();
         change(dir.path(), file, |bytes| edit_lines(bytes, edit, "\n"));
@@ -90,7 +90,7 @@ fn damage_is_reported_with_file_line_and_expectation() {
 
 #[test]
 fn single_files_are_checked_as_a_folder_is() {
-    let dir = stand_in();
+    let dir = synthetic_folder();
     for (what, file, edit, fragments) in DAMAGE {
         let whole = fs::read(dir.path().join(file)).unwrap();
         let check = |bytes: &[u8]| match *file {
@@ -111,7 +111,7 @@ fn single_files_are_checked_as_a_folder_is() {
 #[test]
 fn bytes_that_are_not_text_are_reported_with_their_line() {
     for (file, line, at) in [("rbrdf.dat", 3, 20), ("table.txt", 2, 0)] {
-        let dir = stand_in();
+        let dir = synthetic_folder();
         change(dir.path(), file, |mut bytes| {
             let starts = bytes
                 .iter()
@@ -132,7 +132,7 @@ fn bytes_that_are_not_text_are_reported_with_their_line() {
 
 #[test]
 fn line_ends_trailing_blanks_order_and_blank_lines_at_the_end_do_not_matter() {
-    let dir = stand_in();
+    let dir = synthetic_folder();
     let expected = curet::read(dir.path(), &all(), Invalid::Keep).unwrap();
     let variations: [(&str, Edit, &str); 5] = [
         ("LF", |_| {}, "\n"),
@@ -163,7 +163,7 @@ fn line_ends_trailing_blanks_order_and_blank_lines_at_the_end_do_not_matter() {
 
 #[test]
 fn damage_to_materials_not_asked_for_is_not_looked_at() {
-    let dir = stand_in();
+    let dir = synthetic_folder();
     change(dir.path(), "rbrdf.dat", |bytes| {
         edit_lines(bytes, |l| word(&mut l[4], 9, "x"), "\n")
     });
@@ -174,7 +174,7 @@ fn damage_to_materials_not_asked_for_is_not_looked_at() {
 
 #[test]
 fn a_folder_without_a_complete_set_says_what_was_looked_for_and_found() {
-    let dir = stand_in();
+    let dir = synthetic_folder();
     let message = || {
         curet::read(dir.path(), &all(), Invalid::Clamp)
             .unwrap_err()

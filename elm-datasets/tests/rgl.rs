@@ -197,7 +197,7 @@ fn there_is_no_reflection_at_or_below_the_horizon() {
 }
 
 #[test]
-fn out_of_gamut_colours_are_cut_off_and_spectra_are_not() {
+fn out_of_gamut_colors_are_cut_off_and_spectra_are_not() {
     for (name, expected) in [("rgb", 0.0), ("spectra", -1.0)] {
         let mut fields = on_paper(name, 0);
         for field in &mut fields {

@@ -87,7 +87,7 @@ fn columns_that_say_something_else_are_no_channels_until_someone_says_so() {
 }
 
 #[test]
-fn channels_are_chosen_by_colour_and_wavelength_in_the_order_asked_for() {
+fn channels_are_chosen_by_color_and_wavelength_in_the_order_asked_for() {
     let text = format!("{ANGLES},450 nm,550 nm,650 nm\n10,0,20,180,1,2,3\n");
     let opened = read("a.csv", &text, &with(&["650nm", "0.45 um"], &[])).unwrap();
     assert_eq!(opened.samples.values, array![[3.0, 1.0]]);

@@ -7,9 +7,9 @@
 use elm::solve::{PseudoInverse, Ridge, Solver};
 use elm::{Activation, Dataset, ElmParams, Scaler};
 use elm_brdf::features::Features;
-use elm_brdf::link::Link;
 use elm_brdf::model::{BrdfParams, GlobalScaling};
 use elm_brdf::protocol::{Folds, cross_validate};
+use elm_brdf::target_transform::TargetTransform;
 use elm_datasets::{Invalid, MaterialId, Measurements, curet, synthetic};
 use ndarray::{Array2, ArrayView2, Axis, concatenate};
 
@@ -26,7 +26,7 @@ fn largest(values: ArrayView2<'_, f64>) -> f64 {
     values.iter().fold(0.0, |m, v| m.max(v.abs()))
 }
 
-fn one_factorisation_is_refitting(data: &Measurements) {
+fn one_factorization_is_refitting(data: &Measurements) {
     let x = Features::Paper.compute(&data.directions);
     let values: Vec<_> = data.materials.iter().map(|m| m.values.view()).collect();
     let t = concatenate(Axis(1), &values).unwrap();
@@ -82,7 +82,7 @@ fn where_nothing_is_scaled_scaling_once_is_scaling_in_each_fold() {
     let folds = Folds::new(data.directions.len(), 10, 1).unwrap();
     let params = BrdfParams {
         features: Features::Paper,
-        link: Link::Identity,
+        transform: TargetTransform::Identity,
         // Well conditioned, so that the two routes have the same digits.
         network: ElmParams::new(30)
             .with_activation(Activation::Sine)
@@ -108,14 +108,14 @@ fn where_nothing_is_scaled_scaling_once_is_scaling_in_each_fold() {
 }
 
 #[test]
-fn ten_folds_of_all_materials_of_the_stand_in_are_those_of_refitting() {
-    one_factorisation_is_refitting(&synthetic::measurements(1, &all(), Invalid::Clamp));
+fn ten_folds_of_all_materials_of_the_synthetic_data_are_those_of_refitting() {
+    one_factorization_is_refitting(&synthetic::measurements(1, &all(), Invalid::Clamp));
 }
 
 #[test]
 #[ignore = "needs data: CUReT"]
 fn ten_folds_of_all_measured_materials_are_those_of_refitting() {
     if let Some(dir) = elm_test_support::curet() {
-        one_factorisation_is_refitting(&curet::read(&dir, &all(), Invalid::Clamp).unwrap());
+        one_factorization_is_refitting(&curet::read(&dir, &all(), Invalid::Clamp).unwrap());
     }
 }

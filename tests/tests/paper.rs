@@ -8,15 +8,15 @@ use elm::ElmParams;
 use elm::solve::{Inverse, PseudoInverse};
 use elm_brdf::features::Features;
 use elm_brdf::fit::Fit;
-use elm_brdf::link::Link;
 use elm_brdf::model::BrdfParams;
 use elm_brdf::protocol::{Folds, cross_validate};
+use elm_brdf::target_transform::TargetTransform;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::DirectionPair;
 use elm_datasets::{Invalid, MaterialId, Measurements, synthetic};
 use ndarray::{Axis, s};
 
-fn stand_in() -> Measurements {
+fn synthetic_data() -> Measurements {
     let all: Vec<MaterialId> = MaterialId::all().collect();
     synthetic::measurements(1, &all, Invalid::Clamp)
 }
@@ -24,14 +24,14 @@ fn stand_in() -> Measurements {
 fn params(network: ElmParams<f64>) -> BrdfParams {
     BrdfParams {
         features: Features::Paper,
-        link: Link::Identity,
+        transform: TargetTransform::Identity,
         network: network.with_intercept(false),
     }
 }
 
 #[test]
 fn fitting_materials_together_gives_what_fitting_each_alone_gives() {
-    let together = stand_in();
+    let together = synthetic_data();
     let folds = Folds::new(205, 10, 3).unwrap();
     let paper = params(ElmParams::new(50).with_solver(PseudoInverse::default()));
     let all = cross_validate(&paper, &together, &folds, |_, _| {}).unwrap();
@@ -50,7 +50,7 @@ fn fitting_materials_together_gives_what_fitting_each_alone_gives() {
 
 #[test]
 fn with_as_many_neurons_as_rows_equation_10_interpolates_and_agrees_with_equation_11() {
-    let data = stand_in();
+    let data = synthetic_data();
     let samples = data.samples(0).unwrap();
     // Sine neurons at a large scale give a well-conditioned square matrix, which the paper's
     // smooth sigmoid on six dependent inputs does not.
@@ -76,7 +76,7 @@ fn with_as_many_neurons_as_rows_equation_10_interpolates_and_agrees_with_equatio
 #[test]
 fn repeating_the_first_input_as_the_third_is_a_wider_weight_and_nothing_else() {
     // The paper lists cos(theta_i) beside L.N, which it equals.
-    let data = stand_in();
+    let data = synthetic_data();
     let x = Features::Paper.compute(&data.directions);
     assert_abs_diff_eq!(x.column(0), x.column(2), epsilon = 1e-15);
     let without = x.select(Axis(1), &[0, 1, 3, 4, 5]);

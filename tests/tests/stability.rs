@@ -43,7 +43,7 @@ fn the_default_fit_is_within_a_half_of_the_best_on_every_case_in_single_precisio
 }
 
 #[test]
-fn the_default_fit_is_that_of_the_reference_to_the_digits_that_the_regularised_condition_leaves() {
+fn the_default_fit_is_that_of_the_reference_to_the_digits_that_the_regularized_condition_leaves() {
     // A relative error of 1e-6 of predictions in f64 would mean ten digits lost; the smallest
     // strengths that these cases choose, 1e-14, cost seven (epsilon / sqrt(lambda)).
     let names = [
@@ -71,7 +71,7 @@ fn the_default_fit_is_that_of_the_reference_to_the_digits_that_the_regularised_c
 }
 
 #[test]
-fn a_nan_is_refused_before_any_factorisation() {
+fn a_nan_is_refused_before_any_factorization() {
     // An SVD without a cap on its iterations would never return.
     let mut h = Array2::from_shape_fn((300, 300), |(i, j)| ((i * 300 + j) as f64).sin());
     let t = h.column(0).to_owned().insert_axis(ndarray::Axis(1));

@@ -141,11 +141,11 @@ fn best_of_grid(
     sizes: &[usize],
     seed: u64,
 ) -> Option<Array1<f64>> {
-    let centre = (x.ncols() as f64).sqrt().recip();
+    let center = (x.ncols() as f64).sqrt().recip();
     let mut best = Array1::from_elem(t.ncols(), f64::INFINITY);
     for &neurons in sizes {
         for step in -6..=6 {
-            let scale = centre * 10.0_f64.powf(f64::from(step) / 4.0);
+            let scale = center * 10.0_f64.powf(f64::from(step) / 4.0);
             // Any strength: only the layer is needed.
             let any = Ridge::relative(1.0);
             let layer = base(neurons, seed)

@@ -11,10 +11,10 @@ use std::path::PathBuf;
 use elm::ElmParams;
 use elm::solve::{PseudoInverse, Ridge, Solver};
 use elm_brdf::features::Features;
-use elm_brdf::link::Link;
 use elm_brdf::model::BrdfParams;
 use elm_brdf::protocol::{Folds, MaterialScores, Scores, cross_validate};
 use elm_brdf::published;
+use elm_brdf::target_transform::TargetTransform;
 use elm_datasets::{Invalid, Measurements, curet};
 
 const SEEDS: u64 = 8;
@@ -59,7 +59,7 @@ fn row(
             .with_seed(seed);
         let params = BrdfParams {
             features: Features::Paper,
-            link: Link::Identity,
+            transform: TargetTransform::Identity,
             network,
         };
         let folds = Folds::new(data.directions.len(), 10, seed)?;

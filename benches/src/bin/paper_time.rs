@@ -3,7 +3,7 @@
 //! `cargo run --release -p elm-benches --bin paper_time -- [CURET_DIR]`.
 //!
 //! Both use the same random layer and the same folds, so they must find the same errors. Without a
-//! folder, on the built-in stand-in.
+//! folder, on the built-in synthetic data.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use std::error::Error;
@@ -16,10 +16,10 @@ use elm::solve::PseudoInverse;
 use elm_benches::peers::{Environment, Worker};
 use elm_benches::timing::{median, processor_seconds};
 use elm_brdf::features::Features;
-use elm_brdf::link::Link;
 use elm_brdf::metrics::Metrics;
 use elm_brdf::model::BrdfParams;
 use elm_brdf::protocol::{Folds, MaterialScores, cross_validate};
+use elm_brdf::target_transform::TargetTransform;
 use elm_datasets::{Invalid, MaterialId, Measurements, curet, synthetic};
 use ndarray::{Array1, Array2, Axis};
 use serde_json::{Value, json};
@@ -32,7 +32,7 @@ const SEED: u64 = 1;
 #[derive(Debug, Parser)]
 #[command(name = "paper_time")]
 struct Arguments {
-    /// CUReT's folder; the stand-in's green channel unless given
+    /// CUReT's folder; the synthetic green channel unless given
     curet: Option<PathBuf>,
     /// How many pairs of runs
     #[arg(long, default_value_t = 7)]
@@ -52,7 +52,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folds = Folds::new(data.directions.len(), 10, SEED)?;
     let params = BrdfParams {
         features: Features::Paper,
-        link: Link::Identity,
+        transform: TargetTransform::Identity,
         network: network(),
     };
 
@@ -92,8 +92,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!(
         "NumPy's processor time over ours (median of {} pairs): {:.0}; ours {:.1} ms",
         ratios.len(),
-        median(ratios),
-        median(ours_ms)
+        median(ratios).unwrap_or(0.0),
+        median(ours_ms).unwrap_or(0.0)
     );
     println!(
         "largest relative difference of a measure of error: {:.1e}",

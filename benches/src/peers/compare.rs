@@ -118,7 +118,7 @@ impl OfSize<'_> {
             size: self.size.name,
             peer: rival.to_owned(),
             task,
-            ours_over_peer: median(ratios),
+            ours_over_peer: median(ratios).unwrap_or(0.0),
             rmse_ours: errors.0,
             rmse_peer: errors.1,
             peak_memory_ours_over_peer: None,

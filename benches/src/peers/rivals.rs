@@ -72,7 +72,7 @@ impl Rival {
     }
 
     /// Whether it has a strength of regularisation.
-    pub(super) fn is_regularised(self) -> bool {
+    pub(super) fn is_regularized(self) -> bool {
         matches!(self, Self::ScipyCholesky | Self::SklearnRidge | Self::Hpelm)
     }
 

@@ -30,7 +30,7 @@ pub(super) fn best_of(
     worker: &mut Worker,
     lists: &CrateElm,
 ) -> Result<Best, String> {
-    let alphas: &[f64] = if rival.is_regularised() {
+    let alphas: &[f64] = if rival.is_regularized() {
         &ALPHAS
     } else {
         &[0.0]

@@ -12,7 +12,8 @@ use ndarray::Array2;
 use plotters::prelude::*;
 
 use super::cases::{Problem, conditioned};
-use super::run::{distance, median, reference_of};
+use super::run::{distance, reference_of};
+use crate::timing::median;
 
 /// Errors of one way of solving, by condition number.
 #[derive(Debug, Clone)]
@@ -96,7 +97,7 @@ fn normal_equations(problem: &Problem) -> Option<f64> {
 const CONDITIONS: Range<f64> = 1.0..1e16;
 const ERRORS: Range<f64> = 1e-17..1e1;
 /// Distinct for most colour-blind readers (Okabe and Ito, 2008).
-const COLOURS: [RGBColor; 5] = [
+const COLORS: [RGBColor; 5] = [
     RGBColor(213, 94, 0),
     RGBColor(230, 159, 0),
     RGBColor(0, 158, 115),
@@ -133,14 +134,14 @@ pub fn svg(curves: &[Curve]) -> Result<String, Box<dyn Error>> {
             .y_label_formatter(&|v| format!("{v:.0e}"))
             .label_style(label)
             .draw()?;
-        for (curve, colour) in curves.iter().zip(COLOURS) {
+        for (curve, color) in curves.iter().zip(COLORS) {
             // Below the picture lies only exactness.
             let points = curve.points.iter().map(|&(x, y)| (x, y.max(ERRORS.start)));
             chart
-                .draw_series(LineSeries::new(points, colour.stroke_width(2)))?
+                .draw_series(LineSeries::new(points, color.stroke_width(2)))?
                 .label(curve.name)
                 .legend(move |(x, y)| {
-                    PathElement::new([(x, y), (x + 22, y)], colour.stroke_width(2))
+                    PathElement::new([(x, y), (x + 22, y)], color.stroke_width(2))
                 });
         }
         chart

@@ -26,8 +26,8 @@ pub fn best(
         }
     };
     let (hidden_mean, target_mean) = (mean(hidden)?, mean(targets)?);
-    let centred = &hidden - &hidden_mean;
-    let svd = Mat::from_fn(centred.nrows(), centred.ncols(), |i, j| centred[[i, j]])
+    let centered = &hidden - &hidden_mean;
+    let svd = Mat::from_fn(centered.nrows(), centered.ncols(), |i, j| centered[[i, j]])
         .thin_svd()
         .ok()?;
     let columns = |m: faer::MatRef<'_, f64>| {

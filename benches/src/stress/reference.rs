@@ -42,7 +42,7 @@ pub fn predict(
     );
     let means: Vec<TwoFloat> = columns
         .iter_mut()
-        .map(|column| if intercept { centre(column) } else { ZERO })
+        .map(|column| if intercept { center(column) } else { ZERO })
         .collect();
     let (hidden_means, target_means) = means.split_at(neurons);
     if rows > neurons {
@@ -166,7 +166,7 @@ fn exact(values: ArrayView1<'_, f64>) -> Vec<TwoFloat> {
     values.iter().map(|&value| TwoFloat::from(value)).collect()
 }
 
-fn centre(column: &mut [TwoFloat]) -> TwoFloat {
+fn center(column: &mut [TwoFloat]) -> TwoFloat {
     let sum = column.iter().fold(ZERO, |sum, &value| sum + value);
     let mean = quotient(sum, TwoFloat::from(column.len() as f64));
     for value in column {

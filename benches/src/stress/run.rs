@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::cases::{Level, Magnitude, Problem};
 use super::{Case, oracle, reference};
+use crate::timing::median;
 
 /// A way to the output weights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -409,14 +410,4 @@ fn unit(magnitude: Magnitude, single: bool) -> f64 {
     };
     // Not powi, which may go by way of 2^1056.
     f64::from(exponent).exp2()
-}
-
-pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    match values.len() {
-        0 => None,
-        n if n % 2 == 1 => Some(values[middle]),
-        _ => Some((values[middle - 1] + values[middle]) / 2.0),
-    }
 }

@@ -373,7 +373,7 @@ impl<'a> Picture<'a> {
             .iter()
             .filter_map(|entry| {
                 let sphere = entry.get_ref();
-                let below = Vec3::from(sphere.centre) - camera.up() * sphere.radius * 1.12;
+                let below = Vec3::from(sphere.center) - camera.up() * sphere.radius * 1.12;
                 let label = sphere.label.as_deref()?;
                 let title = self.tracer.cache.title(sphere.material.get_ref());
                 Some((label.replace("{name}", title), camera.project(below)?))

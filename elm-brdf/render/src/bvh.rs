@@ -228,18 +228,18 @@ mod tests {
     proptest! {
         #[test]
         fn the_hierarchy_finds_what_trying_every_form_finds(
-            centres in prop::collection::vec(prop::array::uniform3(-5.0..5.0_f64), 1..60),
+            centers in prop::collection::vec(prop::array::uniform3(-5.0..5.0_f64), 1..60),
             aim in prop::array::uniform3(-2.0..2.0_f64),
         ) {
-            let primitives: Vec<Primitive> = centres
+            let primitives: Vec<Primitive> = centers
                 .iter()
                 .enumerate()
-                .map(|(index, centre)| match index % 3 {
-                    0 => Primitive::Sphere { centre: (*centre).into(), radius: 0.4 },
+                .map(|(index, center)| match index % 3 {
+                    0 => Primitive::Sphere { center: (*center).into(), radius: 0.4 },
                     1 => Primitive::Parallelogram {
-                        corner: (*centre).into(), u: Vec3::x(), v: Vec3::z(),
+                        corner: (*center).into(), u: Vec3::x(), v: Vec3::z(),
                     },
-                    _ => Primitive::Plane { point: Vec3::from(*centre) * 3.0, normal: Vec3::y() },
+                    _ => Primitive::Plane { point: Vec3::from(*center) * 3.0, normal: Vec3::y() },
                 })
                 .collect();
             let ray = Ray {
@@ -264,7 +264,7 @@ mod tests {
     #[test]
     fn many_forms_in_one_place_do_not_overflow_anything() {
         let sphere = Primitive::Sphere {
-            centre: Vec3::zeros(),
+            center: Vec3::zeros(),
             radius: 1.0,
         };
         let hierarchy = Hierarchy::new(vec![sphere; 20_000]);

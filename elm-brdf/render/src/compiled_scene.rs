@@ -228,7 +228,7 @@ impl<M> Builder<'_, M> {
             let light = entry.get_ref();
             self.lights.push(Light::Directional {
                 towards: direction(&place, "towards", light.towards)?,
-                irradiance: colour(&place, "irradiance", light.irradiance)?,
+                irradiance: color(&place, "irradiance", light.irradiance)?,
             });
         }
         for entry in &scene.point {
@@ -236,7 +236,7 @@ impl<M> Builder<'_, M> {
             let light = entry.get_ref();
             self.lights.push(Light::Point {
                 position: finite(&place, "position", light.position)?,
-                intensity: colour(&place, "intensity", light.intensity)?,
+                intensity: color(&place, "intensity", light.intensity)?,
             });
         }
         for entry in &scene.area {
@@ -245,7 +245,7 @@ impl<M> Builder<'_, M> {
             let area = Area {
                 corner: finite(&place, "corner", light.corner)?,
                 edges: edges(&place, light.edge_u, light.edge_v)?,
-                radiance: colour(&place, "radiance", light.radiance)?,
+                radiance: color(&place, "radiance", light.radiance)?,
             };
             let role = Role::Emitter(self.lights.len());
             self.push([area.form()], role);
@@ -276,7 +276,7 @@ impl<M> Builder<'_, M> {
                 (None, None) => None,
             };
             self.lights.push(Light::Environment(Environment {
-                radiance: colour(&place, "radiance", light.radiance)?,
+                radiance: color(&place, "radiance", light.radiance)?,
                 panorama,
                 visible: light.visible,
             }));
@@ -291,8 +291,8 @@ impl<M> Builder<'_, M> {
             let sphere = entry.get_ref();
             let role = self.reflector(&sphere.material)?;
             let radius = positive(&place, "radius", sphere.radius)?;
-            let centre = finite(&place, "centre", sphere.centre)?;
-            self.push([Primitive::Sphere { centre, radius }], role);
+            let center = finite(&place, "center", sphere.center)?;
+            self.push([Primitive::Sphere { center, radius }], role);
         }
         for entry in &scene.plane {
             let place = scene.place(entry);
@@ -395,7 +395,7 @@ fn direction(place: &Place, what: &'static str, value: Triple) -> Result<Vec3> {
         .ok_or_else(|| wrong(place, what, format!("{value:?}"), "a direction"))
 }
 
-fn colour(place: &Place, what: &'static str, value: Triple) -> Result<Rgb> {
+fn color(place: &Place, what: &'static str, value: Triple) -> Result<Rgb> {
     if value.iter().all(|c| (0.0..=MAX_DISTANCE).contains(c)) {
         Ok(value)
     } else {

@@ -151,12 +151,12 @@ impl EnvironmentMap {
                 let key = 9.0 * lamp(phi, theta, [-2.0, 1.05], [0.42, 0.32]);
                 let rim = 6.0 * lamp(phi, theta, [1.2, 1.25], [0.12, 0.55]);
                 let top = 2.5 * edge(theta - 0.45);
-                let colour = [
+                let color = [
                     wall + key + 0.8 * rim + top,
                     wall * 1.02 + 0.96 * key + 0.9 * rim + top,
                     wall * 1.08 + 0.88 * key + rim + top,
                 ];
-                pixels.push(colour.map(|c| c as f32));
+                pixels.push(color.map(|c| c as f32));
             }
         }
         Self::new(width, pixels, rotation)

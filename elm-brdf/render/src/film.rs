@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn an_edge_keeps_its_neighbourhood_going() {
+    fn an_edge_keeps_its_neighborhood_going() {
         let film = film(|pixel, n, _| (0.3, u64::from(pixel == 12 && n == 2)));
         let unfinished = film.unfinished(16, 1.0, 0.5);
         let expected = [6, 7, 8, 11, 12, 13, 16, 17, 18];

@@ -131,9 +131,9 @@ impl Area {
     /// and no larger than half of all directions.
     fn most_solid_angle(&self, point: Vec3) -> f64 {
         let [u, v] = self.edges;
-        let to_centre = (self.corner + (u + v) / 2.0 - point).norm();
+        let to_center = (self.corner + (u + v) / 2.0 - point).norm();
         let reach = (u + v).norm().max((u - v).norm()) / 2.0;
-        let nearest = (to_centre - reach).max(0.0);
+        let nearest = (to_center - reach).max(0.0);
         (u.cross(&v).norm() / (nearest * nearest)).min(2.0 * PI)
     }
 }

@@ -173,7 +173,7 @@ impl LobeMixture {
             let Some((lobe, _)) = least else { break };
             mixture.lobes.remove(lobe);
             problem.densities.remove(lobe);
-            mixture.normalise();
+            mixture.normalize();
             problem.improve(&mut mixture, STEPS_AFTER);
         }
         problem.refine(points, &mut mixture);
@@ -181,12 +181,12 @@ impl LobeMixture {
         mixture
             .lobes
             .retain(|(_, weights)| weights.iter().any(|&w| w > 1e-6));
-        mixture.normalise();
+        mixture.normalize();
         mixture
     }
 
     /// Gives all weights the sum 1, the first lobes at least their least share.
-    fn normalise(&mut self) {
+    fn normalize(&mut self) {
         for term in 0..TERMS {
             let mut rest = 1.0;
             let mut is_least = [false; LEAST.len()];
@@ -386,7 +386,7 @@ impl Problem {
                     *weight *= gain.sqrt();
                 }
             }
-            mixture.normalise();
+            mixture.normalize();
         }
     }
 }

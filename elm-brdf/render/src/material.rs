@@ -64,16 +64,16 @@ impl Material {
             let mut room = Vec::new();
             evaluate(&*brdf, pairs, &mut room)?;
             let rows = room.chunks_exact(channels);
-            Ok(rows.map(|row| colour(row, f64::INFINITY)).collect())
+            Ok(rows.map(|row| color(row, f64::INFINITY)).collect())
         };
-        let grey = |values: &[Rgb]| -> Vec<f64> {
+        let gray = |values: &[Rgb]| -> Vec<f64> {
             let tinted = values.iter().map(|&value| times(value, tint));
             tinted.map(luminance).collect()
         };
         let isotropic = brdf.is_isotropic();
         let pilot = LobeMixture::pilot(isotropic);
         let first = raw(&pilot.pairs)?;
-        let sampler = LobeMixture::fit(&pilot, &grey(&first), isotropic);
+        let sampler = LobeMixture::fit(&pilot, &gray(&first), isotropic);
         let points = sampler.points();
         let values = raw(&points.pairs)?;
         let highest = first
@@ -82,7 +82,7 @@ impl Material {
             .chain(&raw(&LobeMixture::peaks())?)
             .map(|&value| largest(value))
             .fold(0.0, f64::max);
-        let albedo = points.albedo(&grey(&values));
+        let albedo = points.albedo(&gray(&values));
         let largest_albedo = (0..3)
             .flat_map(|channel| {
                 let values: Vec<f64> = values.iter().map(|v| v[channel] * tint[channel]).collect();
@@ -127,7 +127,7 @@ impl Material {
         evaluate(&*self.brdf, pairs, room)?;
         values.clear();
         let rows = room.chunks_exact(self.channels());
-        values.extend(rows.map(|row| times(colour(row, self.max_value), self.factor)));
+        values.extend(rows.map(|row| times(color(row, self.max_value), self.factor)));
         Ok(())
     }
 
@@ -206,7 +206,7 @@ fn evaluate(brdf: &dyn Brdf, pairs: &[DirectionPair], room: &mut Vec<f64>) -> Re
 }
 
 /// One or three values as a colour between 0 and `max_value`.
-fn colour(values: &[f64], max_value: f64) -> Rgb {
+fn color(values: &[f64], max_value: f64) -> Rgb {
     // In this order also no number becomes 0, and infinity the ceiling.
     let safe = |value: f64| value.max(0.0).min(max_value);
     let finite = |value: f64| if value.is_finite() { value } else { 0.0 };

@@ -115,16 +115,16 @@ pub(crate) fn torus_knot(along: usize, around: usize) -> Vec<Triangle> {
     let tube = 0.21;
     let vertex = |i: usize, j: usize| -> (Vec3, Vec3) {
         let t = (i % along) as f64 / along as f64 * TAU;
-        let (centre, step) = (curve(t), 1e-4);
+        let (center, step) = (curve(t), 1e-4);
         let (before, after) = (curve(t - step), curve(t + step));
         let tangent = (after - before).normalize();
         // The curve keeps clear of its own axis, so the way outwards is never along it.
-        let outwards = centre - tangent * tangent.dot(&centre);
+        let outwards = center - tangent * tangent.dot(&center);
         let side = tangent.cross(&outwards).normalize();
         let outwards = side.cross(&tangent);
         let (sin, cos) = ((j % around) as f64 / around as f64 * TAU).sin_cos();
         let normal = outwards * cos + side * sin;
-        (centre + normal * tube, normal)
+        (center + normal * tube, normal)
     };
     let mut triangles = Vec::with_capacity(2 * along * around);
     for i in 0..along {

@@ -43,11 +43,11 @@ fn font(width: u32) -> &'static MonoFont<'static> {
 impl Bitmap {
     /// A picture of one colour.
     #[must_use]
-    pub fn new(width: u32, height: u32, colour: [u8; 3]) -> Self {
+    pub fn new(width: u32, height: u32, color: [u8; 3]) -> Self {
         Self {
             width,
             height,
-            bytes: colour.repeat(width as usize * height as usize),
+            bytes: color.repeat(width as usize * height as usize),
         }
     }
 
@@ -136,8 +136,8 @@ impl Bitmap {
             .alignment(alignment)
             .baseline(Baseline::Top)
             .build();
-        let mut draw = |dx, dy, colour| {
-            let character = MonoTextStyle::new(font, colour);
+        let mut draw = |dx, dy, color| {
+            let character = MonoTextStyle::new(font, color);
             let at = Point::new(x + dx, y + dy);
             // Drawing on this target cannot fail.
             let _ = Text::with_text_style(&line, at, character, style).draw(self);
@@ -263,12 +263,12 @@ impl DrawTarget for Bitmap {
         &mut self,
         pixels: I,
     ) -> Result<(), Self::Error> {
-        for Pixel(at, colour) in pixels {
+        for Pixel(at, color) in pixels {
             let inside =
                 (0..self.width as i32).contains(&at.x) && (0..self.height as i32).contains(&at.y);
             if inside {
                 let start = 3 * (at.y as usize * self.width as usize + at.x as usize);
-                let bytes = [colour.r(), colour.g(), colour.b()];
+                let bytes = [color.r(), color.g(), color.b()];
                 self.bytes[start..start + 3].copy_from_slice(&bytes);
             }
         }

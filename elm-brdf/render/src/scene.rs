@@ -14,7 +14,7 @@
 //! curet = "Felt"
 //!
 //! [[sphere]]
-//! centre = [0, 0, 0]
+//! center = [0, 0, 0]
 //! radius = 1
 //! material = "felt"
 //!
@@ -56,7 +56,7 @@ const WHITE: Triple = [1.0; 3];
 ///     analytic = 'lambert'
 ///     albedo = 0.5
 ///     [[sphere]]
-///     centre = [0, 0, 0]
+///     center = [0, 0, 0]
 ///     radius = 1
 ///     material = 'grey'
 ///     [environment]
@@ -238,7 +238,8 @@ fn yes() -> bool {
 #[serde(deny_unknown_fields)]
 pub struct Sphere {
     /// Its centre.
-    pub centre: Triple,
+    #[serde(alias = "centre")]
+    pub center: Triple,
     /// Its radius.
     pub radius: f64,
     /// Name of its material.

@@ -19,7 +19,7 @@ impl Ray {
 /// A surface of simple form.
 #[derive(Debug, Clone)]
 pub(crate) enum Primitive {
-    Sphere { centre: Vec3, radius: f64 },
+    Sphere { center: Vec3, radius: f64 },
     Plane { point: Vec3, normal: Vec3 },
     Parallelogram { corner: Vec3, u: Vec3, v: Vec3 },
     Triangle(Box<Triangle>),
@@ -61,12 +61,12 @@ impl Primitive {
     pub(crate) fn meet(&self, ray: &Ray, near: f64, far: f64) -> Option<Intersection> {
         let within = |distance: f64| distance > near && distance < far;
         match self {
-            Self::Sphere { centre, radius } => {
-                let to_centre = centre - ray.origin;
-                let along = to_centre.dot(&ray.direction);
+            Self::Sphere { center, radius } => {
+                let to_center = center - ray.origin;
+                let along = to_center.dot(&ray.direction);
                 // The distance of the ray from the centre, without cancellation (Haines et al.,
                 // Precision Improvements for Ray/Sphere Intersection, Ray Tracing Gems, 2019).
-                let across = to_centre - ray.direction * along;
+                let across = to_center - ray.direction * along;
                 let half_squared = radius * radius - across.norm_squared();
                 if half_squared < 0.0 {
                     return None;
@@ -107,9 +107,9 @@ impl Primitive {
         };
         let position = ray.at(meeting.distance);
         match self {
-            Self::Sphere { centre, radius } => {
-                let normal = (position - centre).normalize();
-                flat(centre + normal * *radius, normal, around(normal))
+            Self::Sphere { center, radius } => {
+                let normal = (position - center).normalize();
+                flat(center + normal * *radius, normal, around(normal))
             }
             Self::Plane { normal, .. } => flat(position, *normal, around(*normal)),
             Self::Parallelogram { u, v, .. } => flat(position, u.cross(v).normalize(), *u),
@@ -126,9 +126,9 @@ impl Primitive {
             )
         };
         match self {
-            Self::Sphere { centre, radius } => {
+            Self::Sphere { center, radius } => {
                 let half = Vec3::repeat(*radius);
-                Some([centre - half, centre + half])
+                Some([center - half, center + half])
             }
             Self::Plane { .. } => None,
             Self::Parallelogram { corner, u, v } => {
@@ -223,7 +223,7 @@ mod tests {
     #[test]
     fn a_ray_meets_a_sphere_from_outside_from_inside_and_not_behind() {
         let sphere = Primitive::Sphere {
-            centre: Vec3::zeros(),
+            center: Vec3::zeros(),
             radius: 2.0,
         };
         assert_eq!(

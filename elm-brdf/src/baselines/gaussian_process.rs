@@ -8,8 +8,8 @@ use super::kernel::{Projected, Weights, check_rows};
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::fit::{Fit, Model, assign};
-use crate::link::Link;
 use crate::scales::spread;
+use crate::target_transform::TargetTransform;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::DirectionPair;
 
@@ -54,7 +54,7 @@ pub struct GaussianProcess {
     /// Inputs.
     pub features: Features,
     /// Target.
-    pub link: Link,
+    pub transform: TargetTransform,
     /// Correlation.
     pub covariance: Covariance,
     /// Number of candidates for the length scales, at least 1.
@@ -101,10 +101,10 @@ impl GaussianProcess {
 
     /// With Matérn's covariance of 5/2, the best of the three on CUReT.
     #[must_use]
-    pub fn new(features: Features, link: Link) -> Self {
+    pub fn new(features: Features, transform: TargetTransform) -> Self {
         Self {
             features,
-            link,
+            transform,
             covariance: Covariance::Matern52,
             candidates: Self::CANDIDATES,
         }
@@ -130,7 +130,7 @@ impl Fit for GaussianProcess {
                 expected: "at least 1",
             });
         }
-        let (frame, x, targets) = Frame::fit(self.features, self.link, pairs, values)?;
+        let (frame, x, targets) = Frame::fit(self.features, self.transform, pairs, values)?;
         check_rows("a Gaussian process", x.nrows())?;
         let mean = Array2::ones((x.nrows(), 1));
         let none = Choice {

@@ -6,7 +6,7 @@ use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
 use crate::error::Result;
 use crate::features::Features;
 use crate::fit::check;
-use crate::link::{FittedLink, Link};
+use crate::target_transform::{FittedTransform, TargetTransform};
 use elm_datasets::brdf::check_directions;
 use elm_datasets::geometry::DirectionPair;
 
@@ -14,7 +14,7 @@ use elm_datasets::geometry::DirectionPair;
 /// targets to reflectance.
 pub(super) struct Frame {
     features: Features,
-    link: FittedLink,
+    transform: FittedTransform,
     scaler: Scaler<f64>,
 }
 
@@ -23,24 +23,24 @@ impl Frame {
     /// and (rows, channels).
     pub(super) fn fit(
         features: Features,
-        link: Link,
+        transform: TargetTransform,
         pairs: &[DirectionPair],
         values: ArrayView2<'_, f64>,
     ) -> Result<(Self, Array2<f64>, Array2<f64>)> {
         check(pairs, values)?;
-        let link = link.fit(values)?;
-        let targets = link.to_targets(values)?;
+        let transform = transform.fit(values)?;
+        let targets = transform.to_targets(values)?;
         let raw = features.compute_training(pairs);
         let frame = Self {
             features,
-            link,
+            transform,
             scaler: Scaler::measured(&raw)?,
         };
-        let x = frame.standardise(raw);
+        let x = frame.standardize(raw);
         Ok((frame, x, targets))
     }
 
-    fn standardise(&self, raw: Array2<f64>) -> Array2<f64> {
+    fn standardize(&self, raw: Array2<f64>) -> Array2<f64> {
         (raw - self.scaler.mean()) * self.scaler.factor()
     }
 
@@ -50,7 +50,7 @@ impl Frame {
     /// For a direction that is not finite.
     pub(super) fn points(&self, pairs: &[DirectionPair]) -> Result<Array2<f64>> {
         check_directions(pairs)?;
-        Ok(self.standardise(self.features.compute(pairs)))
+        Ok(self.standardize(self.features.compute(pairs)))
     }
 
     /// Reflectance for predicted targets: not negative, and black below the horizon.
@@ -59,7 +59,7 @@ impl Frame {
         pairs: &[DirectionPair],
         targets: Array2<f64>,
     ) -> Result<Array2<f64>> {
-        let mut values = self.link.to_values(targets)?;
+        let mut values = self.transform.to_values(targets)?;
         for (mut row, pair) in values.rows_mut().into_iter().zip(pairs) {
             let above = pair.is_above_horizon();
             row.mapv_inplace(|value| if above { value.max(0.0) } else { 0.0 });
@@ -68,7 +68,7 @@ impl Frame {
     }
 
     pub(super) fn channels(&self) -> usize {
-        self.link.channels()
+        self.transform.channels()
     }
 
     pub(super) fn inputs(&self) -> usize {
@@ -77,7 +77,7 @@ impl Frame {
 
     /// Numbers kept for each channel.
     pub(super) fn floats_per_channel(&self) -> usize {
-        2 * self.inputs() + self.link.floats_per_channel()
+        2 * self.inputs() + self.transform.floats_per_channel()
     }
 }
 

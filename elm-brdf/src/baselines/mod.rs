@@ -36,7 +36,7 @@ mod inputs;
 mod kernel;
 mod koenderink;
 mod nbrdf;
-mod neighbours;
+mod neighbors;
 mod radial;
 mod subsampled;
 
@@ -44,7 +44,7 @@ pub use analytic::{Analytic, AnalyticModel, Shape};
 pub use gaussian_process::{Covariance, GaussianProcess, GaussianProcessModel};
 pub use koenderink::{Koenderink, KoenderinkModel};
 pub use nbrdf::Nbrdf;
-pub use neighbours::{Neighbours, NeighboursModel};
+pub use neighbors::{Neighbors, NeighborsModel};
 pub use radial::{Radial, RadialBasis, RadialBasisModel, Smoothing};
 pub(crate) use subsampled::Subsampled;
 

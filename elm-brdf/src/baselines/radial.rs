@@ -8,7 +8,7 @@ use super::kernel::{Projected, Weights, check_rows};
 use crate::error::Result;
 use crate::features::Features;
 use crate::fit::{Fit, Model, assign};
-use crate::link::Link;
+use crate::target_transform::TargetTransform;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::DirectionPair;
 
@@ -58,7 +58,7 @@ pub struct RadialBasis {
     /// Inputs.
     pub features: Features,
     /// Target.
-    pub link: Link,
+    pub transform: TargetTransform,
     /// Basis function.
     pub radial: Radial,
     /// Regularisation.
@@ -90,7 +90,7 @@ impl Fit for RadialBasis {
     type Model = RadialBasisModel;
 
     fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
-        let (frame, x, targets) = Frame::fit(self.features, self.link, pairs, values)?;
+        let (frame, x, targets) = Frame::fit(self.features, self.transform, pairs, values)?;
         let (nodes, targets) = match self.smoothing {
             Smoothing::Exact => join_duplicates(&x, &targets),
             Smoothing::LeaveOneOut => (x, targets),

@@ -37,10 +37,10 @@ impl Fit for Subsampled {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::baselines::Neighbours;
+    use crate::baselines::Neighbors;
     use crate::features::Features;
     use crate::fit::boxed;
-    use crate::link::Link;
+    use crate::target_transform::TargetTransform;
     use elm_datasets::Brdf;
     use elm_datasets::geometry::cartesian;
     use ndarray::Array2;
@@ -55,7 +55,10 @@ mod tests {
             .collect();
         let values = Array2::from_shape_fn((50, 1), |(row, _)| row as f64);
         let fit = |max_rows, seed| {
-            let method = boxed(Neighbours::nearest(Features::Cosines, Link::Identity));
+            let method = boxed(Neighbors::nearest(
+                Features::Cosines,
+                TargetTransform::Identity,
+            ));
             let subsampled = Subsampled {
                 method,
                 max_rows,

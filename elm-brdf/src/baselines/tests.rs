@@ -4,8 +4,8 @@ use super::*;
 use crate::error::Error;
 use crate::features::Features;
 use crate::fit::Fit;
-use crate::link::Link;
 use crate::registry::{ModelEntry, with_candidates};
+use crate::target_transform::TargetTransform;
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use elm_datasets::Brdf;
 use elm_datasets::geometry::{DirectionPair, cartesian};
@@ -390,21 +390,21 @@ fn channels_do_not_know_of_each_other() {
 fn settings_out_of_range_and_too_many_rows_are_refused() {
     let pairs = directions(10);
     let values = Array2::from_elem((10, 1), 0.1);
-    let (features, link) = (Features::Cosines, Link::Identity);
-    let none = Neighbours {
+    let (features, transform) = (Features::Cosines, TargetTransform::Identity);
+    let none = Neighbors {
         features,
-        link,
+        transform,
         count: 0,
     };
     assert!(none.fit(&pairs, values.view()).is_err());
     let none = GaussianProcess {
         candidates: 0,
-        ..GaussianProcess::new(features, link)
+        ..GaussianProcess::new(features, transform)
     };
     assert!(none.fit(&pairs, values.view()).is_err());
 
     let many = vec![pairs[0]; kernel::MAX_ROWS + 1];
     let values = Array2::from_elem((many.len(), 1), 0.1);
-    let error = GaussianProcess::new(features, link).fit(&many, values.view());
+    let error = GaussianProcess::new(features, transform).fit(&many, values.view());
     assert!(matches!(error.err(), Some(Error::TooManyRows { .. })));
 }

@@ -63,7 +63,7 @@ pub(super) fn compute<A: Real>(set: Features, d: &[&[A; ROWS]; 6], x: &mut [Bloc
                 };
             }
         }
-        (Features::Grain { .. }, [a, b, c, e, f, g, ..]) => {
+        (Features::Anisotropic { .. }, [a, b, c, e, f, g, ..]) => {
             let (sin, cos) = (2.0 * set.azimuth()).sin_cos();
             let (sin, cos) = (A::from_f64(sin), A::from_f64(cos));
             for r in 0..ROWS {

@@ -12,8 +12,8 @@ use super::real::Real;
 use super::{Batched, Block, Columns, Kernel, ROWS, eval_pairs, inputs, run};
 use crate::error::{Error, Result};
 use crate::features::Features;
-use crate::link::Channel;
 use crate::model::BrdfModel;
+use crate::target_transform::Channel;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::DirectionPair;
 
@@ -29,7 +29,7 @@ pub struct Packed<A: Real> {
     features: Features,
     neurons: usize,
     layers: Layers<A>,
-    links: Vec<Link<A>>,
+    transforms: Vec<InverseTransform<A>>,
     floats: usize,
     floats_per_channel: usize,
 }
@@ -49,7 +49,7 @@ enum Layers<A: Real> {
 
 /// [`Channel`] in the precision of the evaluation.
 #[derive(Debug, Clone, Copy)]
-enum Link<A> {
+enum InverseTransform<A> {
     Identity,
     Log { offset: A, ceiling: A },
     CubeRoot { ceiling: A },
@@ -59,7 +59,7 @@ impl<A: Real> Packed<A> {
     /// Packs a model.
     ///
     /// # Errors
-    /// [`Error::Conflict`] for a network with radial neurons, direct links or a function of
+    /// [`Error::Conflict`] for a network with radial neurons, direct transforms or a function of
     /// the user's own.
     pub fn new(model: &BrdfModel) -> Result<Self> {
         let refused = |first| {
@@ -78,7 +78,7 @@ impl<A: Real> Packed<A> {
             return refused("radial neurons");
         }
         if beta.nrows() != layer.neurons() {
-            return refused("direct links");
+            return refused("direct transforms");
         }
         let mut functions = Vec::new();
         for group in layer.groups() {
@@ -144,7 +144,12 @@ impl<A: Real> Packed<A> {
             features: model.features(),
             neurons: layer.neurons(),
             layers,
-            links: model.link().by_channel().iter().map(Link::new).collect(),
+            transforms: model
+                .target_transform()
+                .by_channel()
+                .iter()
+                .map(InverseTransform::new)
+                .collect(),
             floats: model.stored_floats(),
             floats_per_channel: model.floats_per_channel(),
         })
@@ -162,11 +167,11 @@ impl<A: Real> Packed<A> {
 
     /// Blocks that the network's outputs take, in threes.
     fn outputs(&self) -> usize {
-        self.links.len().next_multiple_of(3)
+        self.transforms.len().next_multiple_of(3)
     }
 }
 
-impl<A: Real> Link<A> {
+impl<A: Real> InverseTransform<A> {
     fn new(channel: &Channel) -> Self {
         // A ceiling beyond the range of single precision is none.
         let ceiling = |ceiling: f64| A::from_f64(ceiling).min(A::max_value());
@@ -264,8 +269,8 @@ impl<A: Real> Kernel<A> for Packed<A> {
             }
         }
         let (iz, oz) = (directions[2], directions[5]);
-        for ((link, targets), out) in self.links.iter().zip(&*targets).zip(out) {
-            link.values(targets, iz, oz, out);
+        for ((transform, targets), out) in self.transforms.iter().zip(&*targets).zip(out) {
+            transform.values(targets, iz, oz, out);
         }
     }
 }
@@ -276,13 +281,13 @@ impl<A: Real> Packed<A> {
     /// # Errors
     /// [`Error::Shape`] unless `out` has a value for each pair and channel.
     pub fn eval_into(&self, directions: &Columns<A>, out: &mut [A]) -> Result<()> {
-        run(self, self.links.len(), directions, out)
+        run(self, self.transforms.len(), directions, out)
     }
 }
 
 impl<A: Real> Batched<A> for Packed<A> {
     fn channels(&self) -> usize {
-        self.links.len()
+        self.transforms.len()
     }
 
     fn eval_into(&self, directions: &Columns<A>, out: &mut [A]) -> Result<()> {
@@ -294,7 +299,7 @@ macro_rules! brdf {
     ($type:ident, $precision:ident) => {
         impl Brdf for Packed<$type> {
             fn channels(&self) -> usize {
-                self.links.len()
+                self.transforms.len()
             }
 
             fn is_isotropic(&self) -> bool {
@@ -312,7 +317,7 @@ macro_rules! brdf {
 
         impl Model for Packed<$type> {
             fn multiply_adds(&self) -> usize {
-                self.neurons * (self.inputs() + self.links.len())
+                self.neurons * (self.inputs() + self.transforms.len())
             }
 
             fn floats_per_channel(&self) -> usize {

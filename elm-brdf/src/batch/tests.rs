@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::features::Features;
-use crate::link::Link;
 use crate::model::{BrdfModel, BrdfParams};
+use crate::target_transform::TargetTransform;
 use elm::solve::Ridge;
 use elm::{Activation, ElmParams, NodeType};
 use elm_datasets::Brdf;
@@ -28,7 +28,12 @@ fn directions(count: usize) -> Vec<DirectionPair> {
         .collect()
 }
 
-fn model(features: Features, link: Link, network: ElmParams<f64>, channels: usize) -> BrdfModel {
+fn model(
+    features: Features,
+    transform: TargetTransform,
+    network: ElmParams<f64>,
+    channels: usize,
+) -> BrdfModel {
     let pairs = directions(200);
     let values = Array2::from_shape_fn((200, channels), |(row, channel)| {
         let pair = &pairs[row];
@@ -37,7 +42,7 @@ fn model(features: Features, link: Link, network: ElmParams<f64>, channels: usiz
     });
     BrdfParams {
         features,
-        link,
+        transform,
         network: network.with_solver(Ridge::relative(1e-6)),
     }
     .fit_model(&pairs, values.view())
@@ -47,19 +52,23 @@ fn model(features: Features, link: Link, network: ElmParams<f64>, channels: usiz
 #[test]
 fn every_set_of_inputs_link_and_function_gives_what_the_general_way_gives() {
     let pairs = directions(333);
-    let links = [Link::Identity, Link::default_log(), Link::CubeRoot];
+    let transforms = [
+        TargetTransform::Identity,
+        TargetTransform::default_log(),
+        TargetTransform::CubeRoot,
+    ];
     for (number, features) in Features::ALL.into_iter().enumerate() {
         for (other, function) in Activation::<f64>::BUILT_IN.into_iter().enumerate() {
             // The step has no value to compare where a rounding decides on which side it is.
             if function == Activation::HardLimit {
                 continue;
             }
-            let link = links[(number + other) % 3];
+            let transform = transforms[(number + other) % 3];
             let channels = [1, 3, 4][other % 3];
             let network = ElmParams::new(25)
                 .with_activation(function.clone())
                 .with_seed(3);
-            let model = model(features, link, network, channels);
+            let model = model(features, transform, network, channels);
             let expected = model.eval(&pairs).unwrap();
             let packed: Packed<f64> = Packed::new(&model).unwrap();
             // Weights are of the order of 1e3 at this strength, so that of 16 digits 12 are left.
@@ -83,7 +92,12 @@ fn every_set_of_inputs_link_and_function_gives_what_the_general_way_gives() {
 #[test]
 fn a_row_does_not_depend_on_the_rows_beside_it() {
     let network = ElmParams::new(20).with_activation(Activation::SquaredRelu);
-    let model = model(Features::Algebraic, Link::default_log(), network, 3);
+    let model = model(
+        Features::Algebraic,
+        TargetTransform::default_log(),
+        network,
+        3,
+    );
     let packed: Packed<f32> = Packed::new(&model).unwrap();
     let pairs = directions(2 * ROWS + 5);
     let all = packed.eval(&pairs).unwrap();
@@ -100,7 +114,12 @@ fn neurons_of_two_functions_are_evaluated_each_by_its_own() {
         .with_activation(Activation::Sine)
         .with_group(elm::NeuronGroup::new(5, Activation::SquaredRelu))
         .with_group(elm::NeuronGroup::new(4, Activation::Tanh));
-    let model = model(Features::Cosines, Link::default_log(), network, 3);
+    let model = model(
+        Features::Cosines,
+        TargetTransform::default_log(),
+        network,
+        3,
+    );
     let packed: Packed<f64> = Packed::new(&model).unwrap();
     let pairs = directions(70);
     let expected = model.eval(&pairs).unwrap();
@@ -110,7 +129,12 @@ fn neurons_of_two_functions_are_evaluated_each_by_its_own() {
 #[test]
 fn below_the_horizon_and_for_what_is_no_direction_values_are_black_or_finite() {
     let network = ElmParams::new(20).with_activation(Activation::Relu);
-    let model = model(Features::Algebraic, Link::default_log(), network, 3);
+    let model = model(
+        Features::Algebraic,
+        TargetTransform::default_log(),
+        network,
+        3,
+    );
     let packed: Packed<f32> = Packed::new(&model).unwrap();
     let up = [0.0, 0.0, 1.0];
     let pair = |incident: [f64; 3]| DirectionPair {
@@ -142,7 +166,7 @@ fn what_does_not_fit_is_refused() {
     let own = Activation::custom("cube", |z: f64| z * z * z);
     let networks = [
         (ElmParams::new(9).with_activation(own), "own"),
-        (ElmParams::new(9).with_direct_links(true), "links"),
+        (ElmParams::new(9).with_direct_links(true), "transforms"),
         (
             ElmParams::new(9)
                 .with_activation(Activation::Gaussian)
@@ -151,11 +175,16 @@ fn what_does_not_fit_is_refused() {
         ),
     ];
     for (network, part) in networks {
-        let model = model(Features::Cosines, Link::Identity, network, 1);
+        let model = model(Features::Cosines, TargetTransform::Identity, network, 1);
         let error = Packed::<f32>::new(&model).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");
     }
-    let model = model(Features::Cosines, Link::Identity, ElmParams::new(9), 1);
+    let model = model(
+        Features::Cosines,
+        TargetTransform::Identity,
+        ElmParams::new(9),
+        1,
+    );
     let packed: Packed<f64> = Packed::new(&model).unwrap();
     let columns = Columns::new(&directions(4));
     assert!(packed.eval_into(&columns, &mut [0.0; 3]).is_err());
@@ -169,7 +198,7 @@ fn what_does_not_fit_is_refused() {
 #[test]
 fn a_model_of_many_channels_is_that_of_each_by_itself() {
     let network = ElmParams::new(20).with_activation(Activation::SquaredRelu);
-    let model = model(Features::Algebraic, Link::CubeRoot, network, 7);
+    let model = model(Features::Algebraic, TargetTransform::CubeRoot, network, 7);
     let packed: Packed<f64> = Packed::new(&model).unwrap();
     let pairs = directions(80);
     let (values, expected) = (packed.eval(&pairs).unwrap(), model.eval(&pairs).unwrap());

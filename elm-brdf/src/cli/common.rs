@@ -2,9 +2,10 @@
 
 use std::fmt::Display;
 use std::io::{self, IsTerminal};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -12,6 +13,40 @@ use super::data::{self, Source};
 use super::{Failure, say};
 use crate::error::Error;
 use crate::scene_materials::SceneMaterialLoader;
+
+/// Where CUReT's files are.
+#[derive(Debug, Args)]
+pub(super) struct DataFolder {
+    /// Folder of CUReT files: table.txt with abrdf.dat, or with rbrdf.dat, gbrdf.dat and
+    /// bbrdf.dat.
+    #[arg(long, value_name = "DIR")]
+    pub(super) data: Option<PathBuf>,
+}
+
+/// How models are cross-validated.
+#[derive(Debug, Args)]
+pub(super) struct Protocol {
+    /// Number of folds, at least 2.
+    #[arg(
+        long,
+        value_name = "N",
+        allow_negative_numbers = true,
+        default_value_t = 10
+    )]
+    pub(super) folds: usize,
+    /// Seed of the folds and of random layers.
+    #[arg(
+        long,
+        value_name = "N",
+        allow_negative_numbers = true,
+        default_value_t = 1
+    )]
+    pub(super) seed: u64,
+    /// Number of seeds, at least 1: figures are means over this one and those that follow.
+    #[arg(long, value_name = "N", default_value_t = 1,
+          value_parser = clap::value_parser!(u16).range(1..))]
+    pub(super) seeds: u16,
+}
 
 /// Reads one of `names`, and lists them in the help and in the error.
 pub(super) fn one_of<T>(
@@ -37,7 +72,7 @@ pub(super) fn library(named: Option<&Path>) -> Result<SceneMaterialLoader, Failu
     Ok(SceneMaterialLoader::new(curet))
 }
 
-/// Tells whoever sits at a terminal how to get measurements in place of the stand-in.
+/// Tells whoever sits at a terminal how to get measurements in place of the synthetic data.
 pub(super) fn hint(source: &Source) {
     if *source != Source::Synthetic || !io::stderr().is_terminal() {
         return;

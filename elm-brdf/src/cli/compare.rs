@@ -7,7 +7,7 @@ use clap::Args;
 use elm_datasets::{Invalid, Measurements, Origin};
 use ndarray::{ArrayView2, Axis};
 
-use super::common::{hint, one_of, progress, usage};
+use super::common::{Protocol, hint, one_of, progress, usage};
 use super::data::Source;
 use super::samples::{Material, Reading};
 use super::{Failure, models, overwrite, print};
@@ -38,16 +38,8 @@ pub(super) struct Arguments {
     /// table prints them, or without what is in brackets at their end, for all of that name.
     #[arg(long, value_name = "LIST", default_value = "all")]
     models: String,
-    /// Number of folds, at least 2.
-    #[arg(long, value_name = "N", default_value_t = 10)]
-    folds: usize,
-    /// Seed of the folds and of random layers.
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
-    /// Number of seeds, at least 1: figures are means over this one and those that follow.
-    #[arg(long, value_name = "N", default_value_t = 1,
-          value_parser = clap::value_parser!(u16).range(1..))]
-    seeds: u16,
+    #[command(flatten)]
+    protocol: Protocol,
     /// Form of the output.
     #[arg(long, value_name = "FORM", default_value = "table",
           value_parser = one_of::<Format>(Format::ALL.map(Format::name)))]
@@ -67,11 +59,13 @@ enum Subject {
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
-    let seeds: Vec<u64> = (arguments.seed..).take(arguments.seeds.into()).collect();
-    let names = models::select(&arguments.models, arguments.seed)?;
+    let seeds: Vec<u64> = (arguments.protocol.seed..)
+        .take(arguments.protocol.seeds.into())
+        .collect();
+    let names = models::select(&arguments.models, arguments.protocol.seed)?;
     let inputs = match &arguments.samples {
         Some(name) => arguments.reading.inputs(name),
-        None => Source::find(arguments.reading.data.as_deref())?.files(),
+        None => Source::find(arguments.reading.folder.data.as_deref())?.files(),
     };
     if let Some(dir) = &arguments.plot {
         overwrite::refuse_folder(
@@ -83,7 +77,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let subject = match &arguments.samples {
         Some(name) => Subject::Samples(arguments.reading.read(name)?),
         None => {
-            let source = Source::find(arguments.reading.data.as_deref())?;
+            let source = Source::find(arguments.reading.folder.data.as_deref())?;
             let materials = source.select(&arguments.materials)?;
             let data = source.load(&materials, arguments.reading.invalid)?;
             hint(&source);
@@ -91,7 +85,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     };
     // Before the first fit.
-    Folds::new(subject.rows(), arguments.folds, arguments.seed).map_err(usage)?;
+    Folds::new(
+        subject.rows(),
+        arguments.protocol.folds,
+        arguments.protocol.seed,
+    )
+    .map_err(usage)?;
 
     let progress = progress("model");
     progress.set_length((names.len() * seeds.len()) as u64);
@@ -110,7 +109,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
             let model = models::select(&arguments.models, seed)?
                 .swap_remove(index)
                 .with_row_limit(seed);
-            let folds = Folds::new(subject.rows(), arguments.folds, seed).map_err(usage)?;
+            let folds =
+                Folds::new(subject.rows(), arguments.protocol.folds, seed).map_err(usage)?;
             runs.push(if model.name == registry::POOLED {
                 subject.pooled(seed, arguments.reading.invalid, &folds)?
             } else {
@@ -118,7 +118,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
             });
             progress.inc(1);
         }
-        let entry = subject.entry(named, fitting, arguments.folds, &runs)?;
+        let entry = subject.entry(named, fitting, arguments.protocol.folds, &runs)?;
         let error = entry.held_out.rmse;
         if best.as_ref().is_none_or(|best| error < best.0) {
             best = Some((error, entry.model.clone(), runs.swap_remove(0)));
@@ -130,13 +130,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scores = best.as_ref().map_or(&[][..], |best| best.2.as_slice());
     let data = subject.data(scores);
     if let (Some(dir), Some((_, model, scores))) = (&arguments.plot, &best) {
-        let title = format!("{}; {model}, seed {}", data.source, arguments.seed);
+        let title = format!("{}; {model}, seed {}", data.source, arguments.protocol.seed);
         plot::write(dir, &title, &subject.shown(scores))?;
     }
     let comparison = Comparison::new(
         data,
-        arguments.folds,
-        arguments.seed,
+        arguments.protocol.folds,
+        arguments.protocol.seed,
         seeds.len(),
         entries,
         start.elapsed().as_secs_f64(),
@@ -225,7 +225,7 @@ impl Subject {
         let words = ModelLabel {
             model: model.name.clone(),
             features: model.features.map(|features| features.name().to_owned()),
-            target: model.link.map(|link| link.name().to_owned()),
+            target: model.transform.map(|transform| transform.name().to_owned()),
             network: model.network,
         };
         let train = self.rows() - self.rows() / folds;

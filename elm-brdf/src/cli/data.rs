@@ -1,5 +1,5 @@
 //! Where the measurements come from: `--data`, then `ELM_BRDF_DATA`, then the user's cache
-//! folder, then the built-in stand-in.
+//! folder, then the built-in synthetic data.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -14,15 +14,15 @@ use crate::published;
 /// The environment variable that names a folder of CUReT files.
 pub(super) const VARIABLE: &str = "ELM_BRDF_DATA";
 
-/// The stand-in is one data set: its noise does not follow `--seed`.
-const STAND_IN_SEED: u64 = 1;
+/// The synthetic data is one data set: its noise does not follow `--seed`.
+const SYNTHETIC_SEED: u64 = 1;
 
 /// A place that measurements can be loaded from.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Source {
     /// A folder of CUReT files.
     Curet(PathBuf),
-    /// The built-in stand-in.
+    /// The built-in synthetic data.
     Synthetic,
 }
 
@@ -70,7 +70,7 @@ impl Source {
     ) -> Result<Measurements, Failure> {
         match self {
             Self::Curet(dir) => Ok(curet::read(dir, materials, invalid)?),
-            Self::Synthetic => Ok(synthetic::measurements(STAND_IN_SEED, materials, invalid)),
+            Self::Synthetic => Ok(synthetic::measurements(SYNTHETIC_SEED, materials, invalid)),
         }
     }
 
@@ -86,7 +86,7 @@ impl Source {
     pub(super) fn caption(&self) -> &'static str {
         match self {
             Self::Curet(_) => "CUReT",
-            Self::Synthetic => "the synthetic stand-in",
+            Self::Synthetic => "synthetic data",
         }
     }
 
@@ -94,7 +94,7 @@ impl Source {
     pub(super) fn describe(&self) -> String {
         match self {
             Self::Curet(dir) => format!("CUReT files in {}", dir.display()),
-            Self::Synthetic => format!("built-in synthetic stand-in, seed {STAND_IN_SEED}"),
+            Self::Synthetic => format!("built-in synthetic data, seed {SYNTHETIC_SEED}"),
         }
     }
 }

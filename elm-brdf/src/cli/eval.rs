@@ -2,10 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::common::one_of;
 use super::samples::{Material, Reading};
 use super::{Failure, print};
 use crate::error::Error;
@@ -23,45 +22,17 @@ pub(super) struct Arguments {
     /// or 'curet:NAME'.
     samples: String,
     /// Form of the output.
-    #[arg(long, value_name = "FORM", default_value = "table",
-          value_parser = one_of::<Format>(Format::ALL.map(Format::name)))]
+    #[arg(long, value_enum, value_name = "FORM", default_value_t = Format::Table)]
     format: Format,
     #[command(flatten)]
     reading: Reading,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Format {
     Table,
     Json,
     Csv,
-}
-
-impl Format {
-    const ALL: [Self; 3] = [Self::Table, Self::Json, Self::Csv];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Table => "table",
-            Self::Json => "json",
-            Self::Csv => "csv",
-        }
-    }
-}
-
-impl std::str::FromStr for Format {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self, Error> {
-        Self::ALL
-            .into_iter()
-            .find(|format| format.name() == name)
-            .ok_or_else(|| Error::UnknownName {
-                what: "form",
-                name: name.to_owned(),
-                expected: Self::ALL.map(Self::name).join(", "),
-            })
-    }
 }
 
 /// The JSON form, field for field.

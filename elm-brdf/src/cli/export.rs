@@ -57,7 +57,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
             recipes::network(None).fit(pairs, samples.values.view())?
         }
         None => {
-            let library = library(reading.data.as_deref())?;
+            let library = library(reading.folder.data.as_deref())?;
             library
                 .model(&asked(&arguments.model), Path::new(""))?
                 .model

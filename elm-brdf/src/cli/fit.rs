@@ -96,7 +96,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     model.save(&arguments.output).map_err(Error::from)?;
     let mut text = describe(&model, &counts, seconds);
     if !model.features().is_isotropic() {
-        text.push_str(GRAIN);
+        text.push_str(GRAIN_NOTICE);
     }
     text.push_str(&what_is_missing(pairs));
     text.push_str(&albedo_of(&model)?);
@@ -105,7 +105,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// What a user of a surface that is not isotropic must know.
-const GRAIN: &str = "\
+const GRAIN_NOTICE: &str = "\
 the surface has a grain: it looks different when it is turned about its normal, and the model turns with it; \
 azimuths count from the x axis of the measurements\n";
 

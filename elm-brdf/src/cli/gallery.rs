@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use elm_datasets::Invalid;
 
-use super::common::{hint, progress};
+use super::common::{DataFolder, hint, progress};
 use super::data::Source;
 use super::{Failure, overwrite, print};
 use crate::error::Error;
@@ -24,9 +24,8 @@ pub(super) struct Arguments {
     /// Folder for the page: index.html and a picture of each material.
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
-    /// Folder of CUReT files.
-    #[arg(long, value_name = "DIR")]
-    data: Option<PathBuf>,
+    #[command(flatten)]
+    folder: DataFolder,
     /// 'paper', 'all', or a list of numbers and names, such as '1,39,orange peel'.
     #[arg(long, value_name = "LIST", default_value = "paper")]
     materials: String,
@@ -39,7 +38,7 @@ pub(super) struct Arguments {
 const FOLDS: (usize, u64) = (10, 1);
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let source = Source::find(arguments.data.as_deref())?;
+    let source = Source::find(arguments.folder.data.as_deref())?;
     let materials = source.select(&arguments.materials)?;
     let pictures = (1..=materials.len()).map(|number| format!("sphere-{number:02}.png"));
     let mut names: Vec<String> = pictures.collect();

@@ -138,7 +138,7 @@ fn refuse_inputs(arguments: &Arguments) -> Result<(), Failure> {
         inputs.extend(test_beside(name).map(Into::into));
     }
     if arguments.samples.is_empty() {
-        inputs.extend(Source::find(reading.data.as_deref())?.files());
+        inputs.extend(Source::find(reading.folder.data.as_deref())?.files());
     }
     let names = overwrite::names(&["pareto"], &["csv", "json", "svg", "png"]);
     overwrite::refuse_folder(&arguments.out, &names, &inputs)?;
@@ -259,7 +259,7 @@ fn of_samples(arguments: &Arguments, name: &str, test: Option<&str>) -> Result<S
 const NBRDF: &str = "nbrdf (published)";
 
 fn of_materials(arguments: &Arguments) -> Result<Subject, Failure> {
-    let source = Source::find(arguments.reading.data.as_deref())?;
+    let source = Source::find(arguments.reading.folder.data.as_deref())?;
     let materials = source.select(&arguments.materials)?;
     let data = source.load(&materials, arguments.reading.invalid)?;
     hint(&source);

@@ -7,7 +7,7 @@ use elm::persist;
 use elm_datasets::{Invalid, MaterialId};
 use ndarray::{Axis, concatenate};
 
-use super::common::{hint, usage};
+use super::common::{DataFolder, hint, usage};
 use super::data::Source;
 use super::{Failure, overwrite, print};
 use crate::error::Error;
@@ -31,9 +31,8 @@ enum Command {
 /// counts as a material.
 #[derive(Debug, Args)]
 struct Build {
-    /// Folder of CUReT files.
-    #[arg(long, value_name = "DIR")]
-    data: Option<PathBuf>,
+    #[command(flatten)]
+    folder: DataFolder,
     /// Materials to learn from: 'paper', 'all', or a list of numbers and names.
     #[arg(long, value_name = "LIST", default_value = "all")]
     materials: String,
@@ -56,7 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if build.neurons == 0 {
         return Err(usage("--neurons is 0, expected at least 1"));
     }
-    let source = Source::find(build.data.as_deref())?;
+    let source = Source::find(build.folder.data.as_deref())?;
     overwrite::refuse([build.output.as_path()], &source.files())?;
     hint(&source);
     let mut materials = source.select(&build.materials)?;

@@ -6,7 +6,7 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::common::library;
+use super::common::{DataFolder, library};
 use super::data::Source;
 use super::{Failure, overwrite, print, say};
 use crate::error::Error;
@@ -20,7 +20,7 @@ use crate::scenes::builtin;
 ///
 /// SCENE is a TOML file or a built-in scene: builtin:materials, builtin:contact-sheet,
 /// builtin:comparison or builtin:mesh. Measurements are looked for as by 'reproduce'; without
-/// CUReT's files its materials come from the built-in stand-in, and the caption says so.
+/// CUReT's files its materials come from the built-in synthetic data, and the caption says so.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// TOML file, or builtin:NAME.
@@ -28,9 +28,8 @@ pub(super) struct Arguments {
     /// The picture: .png (sRGB, with captions) or .exr (linear radiance).
     #[arg(short, long, value_name = "IMAGE")]
     output: PathBuf,
-    /// Folder of CUReT files.
-    #[arg(long, value_name = "DIR")]
-    data: Option<PathBuf>,
+    #[command(flatten)]
+    folder: DataFolder,
     /// For a built-in scene, the material by CUReT's number or name.
     #[arg(long, value_name = "NAME")]
     material: Option<String>,
@@ -87,10 +86,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     for scene in sheet.scenes() {
         inputs.extend(overwrite::of_scene(Path::new(&arguments.scene), scene));
     }
-    inputs.extend(Source::find(arguments.data.as_deref())?.files());
+    inputs.extend(Source::find(arguments.folder.data.as_deref())?.files());
     let outputs = std::iter::once(&arguments.output).chain(&arguments.account);
     overwrite::refuse(outputs.map(PathBuf::as_path), &inputs)?;
-    let library = library(arguments.data.as_deref())?;
+    let library = library(arguments.folder.data.as_deref())?;
     let options = Options {
         savings: arguments.savings(),
         threads: arguments.threads,

@@ -8,7 +8,7 @@ use elm::Activation;
 use elm::solve::{PseudoInverse, Solver};
 use elm_datasets::{Invalid, Measurements};
 
-use super::common::{hint, one_of, progress, usage};
+use super::common::{DataFolder, Protocol, hint, one_of, progress, usage};
 use super::data::Source;
 use super::{Failure, models, overwrite, print};
 use crate::fit::{AnyFit, boxed};
@@ -16,19 +16,17 @@ use crate::model::{BrdfParams, GlobalScaling};
 use crate::protocol::{Folds, MaterialScores, cross_validate};
 use crate::registry;
 use crate::report::plot::{self, PredictionPlot};
-use crate::report::{Format, Protocol, Report, Seconds};
+use crate::report::{self, Format, Report, Seconds};
 
 /// Recompute the paper's Tables I to III by cross-validation, beside what the paper printed.
 ///
 /// Measurements are looked for in --data, then in the folder that ELM_BRDF_DATA names, then in
-/// this program's folder in the user's cache; with none of them the built-in synthetic stand-in
+/// this program's folder in the user's cache; with none of them the built-in synthetic data
 /// is used, and the output says so.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Folder of CUReT files: table.txt with abrdf.dat, or with rbrdf.dat, gbrdf.dat and
-    /// bbrdf.dat.
-    #[arg(long, value_name = "DIR")]
-    data: Option<PathBuf>,
+    #[command(flatten)]
+    folder: DataFolder,
     /// 'paper', 'all', or a list of numbers and names, such as '1,39,orange peel'.
     #[arg(long, value_name = "LIST", default_value = "paper")]
     materials: String,
@@ -37,26 +35,8 @@ pub(super) struct Arguments {
     /// choose their settings in each fold by its training rows alone.
     #[arg(long, value_name = "NAME", default_value = "paper")]
     model: String,
-    /// Number of folds, at least 2.
-    #[arg(
-        long,
-        value_name = "N",
-        allow_negative_numbers = true,
-        default_value_t = 10
-    )]
-    folds: usize,
-    /// Seed of the random layer and of the folds.
-    #[arg(
-        long,
-        value_name = "N",
-        allow_negative_numbers = true,
-        default_value_t = 1
-    )]
-    seed: u64,
-    /// Number of seeds, at least 1: figures are means over this one and those that follow.
-    #[arg(long, value_name = "N", default_value_t = 1,
-          value_parser = clap::value_parser!(u16).range(1..))]
-    seeds: u16,
+    #[command(flatten)]
+    protocol: Protocol,
     /// Hidden neurons of the paper's network, at least 1 [default: 50].
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     neurons: Option<usize>,
@@ -138,7 +118,7 @@ impl Model {
         if arguments.model == "best" {
             return Ok(Self::WithPrior);
         }
-        let model = models::named(&arguments.model, arguments.seed)?;
+        let model = models::named(&arguments.model, arguments.protocol.seed)?;
         Ok(if model.name == registry::POOLED {
             Self::WithPrior
         } else {
@@ -160,13 +140,13 @@ impl Model {
             .network
             .with_activation(arguments.activation())
             .with_solver(solver)
-            .with_seed(arguments.seed);
+            .with_seed(arguments.protocol.seed);
         params.network.check().map_err(usage)?;
         Ok(Self::Paper(Box::new(params), once))
     }
 
-    fn protocol(&self, arguments: &Arguments) -> Result<Protocol, Failure> {
-        let mut protocol = Protocol {
+    fn protocol(&self, arguments: &Arguments) -> Result<report::Protocol, Failure> {
+        let mut protocol = report::Protocol {
             model: arguments.model.clone(),
             features: None,
             target: None,
@@ -174,15 +154,15 @@ impl Model {
             activation: None,
             solver: None,
             scaling: None,
-            folds: arguments.folds,
-            seed: arguments.seed,
-            seeds: arguments.seeds.into(),
+            folds: arguments.protocol.folds,
+            seed: arguments.protocol.seed,
+            seeds: arguments.protocol.seeds.into(),
         };
         match self {
             Self::Paper(params, once) => {
                 let scaling = if *once { "once" } else { "fold" };
                 protocol.features = Some(params.features.name().to_owned());
-                protocol.target = Some(params.link.name().to_owned());
+                protocol.target = Some(params.transform.name().to_owned());
                 protocol.neurons = Some(params.network.neurons());
                 protocol.activation = Some(arguments.activation().name().to_owned());
                 protocol.solver = Some(arguments.solver().name().to_owned());
@@ -193,9 +173,9 @@ impl Model {
                     Self::Named(name) => name,
                     _ => registry::POOLED,
                 };
-                let model = models::named(name, arguments.seed)?;
+                let model = models::named(name, arguments.protocol.seed)?;
                 protocol.features = model.features.map(|features| features.name().to_owned());
-                protocol.target = model.link.map(|link| link.name().to_owned());
+                protocol.target = model.transform.map(|transform| transform.name().to_owned());
                 protocol.model = model.name;
             }
         }
@@ -224,7 +204,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let model = Model::new(arguments)?;
     let protocol = model.protocol(arguments)?;
 
-    let source = Source::find(arguments.data.as_deref())?;
+    let source = Source::find(arguments.folder.data.as_deref())?;
     let files = source.files();
     if let Some(dir) = &arguments.out {
         let names = overwrite::names(&["reproduce"], &["txt", "md", "csv", "json"]);
@@ -242,8 +222,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let load = start.elapsed().as_secs_f64();
 
     let rows = data.directions.len();
-    Folds::new(rows, arguments.folds, arguments.seed).map_err(usage)?;
-    let seeds: Vec<u64> = (arguments.seed..).take(arguments.seeds.into()).collect();
+    Folds::new(rows, arguments.protocol.folds, arguments.protocol.seed).map_err(usage)?;
+    let seeds: Vec<u64> = (arguments.protocol.seed..)
+        .take(arguments.protocol.seeds.into())
+        .collect();
     hint(&source);
     let progress = progress(match model {
         Model::WithPrior => "material",
@@ -251,7 +233,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     });
     let mut runs = Vec::new();
     for (index, &seed) in seeds.iter().enumerate() {
-        let folds = Folds::new(rows, arguments.folds, seed).map_err(usage)?;
+        let folds = Folds::new(rows, arguments.protocol.folds, seed).map_err(usage)?;
         let done = |done, all| {
             progress.set_length((all * seeds.len()) as u64);
             progress.set_position((all * index + done) as u64);
@@ -278,7 +260,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let report = Report::new(source.describe(), &data, protocol, &runs, seconds);
     if let (Some(dir), Some(scores)) = (&arguments.plot, runs.first()) {
-        let method = model.method(arguments.seed)?;
+        let method = model.method(arguments.protocol.seed)?;
         draw(dir, &report, &data, scores, method.as_deref())?;
     }
     if let Some(dir) = &arguments.out {

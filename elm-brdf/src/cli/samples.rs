@@ -10,7 +10,7 @@ use elm_datasets::{
     Invalid, MaterialId, OpenOptions, STANDARD_INPUT, Samples, Sampling, open, paint, uncompressed,
 };
 
-use super::common::one_of;
+use super::common::{DataFolder, one_of};
 use super::data::Source;
 use super::{Failure, say};
 
@@ -37,10 +37,8 @@ fn angle(text: &str) -> Result<(usize, f64), String> {
 /// What the samples themselves do not say.
 #[derive(Debug, Args)]
 pub(super) struct Reading {
-    /// Folder of CUReT files: table.txt with abrdf.dat, or with rbrdf.dat, gbrdf.dat and
-    /// bbrdf.dat.
-    #[arg(long, value_name = "DIR")]
-    pub(super) data: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) folder: DataFolder,
     /// Angles of a CSV file are in degrees rather than radians.
     #[arg(long)]
     degrees: bool,
@@ -197,7 +195,8 @@ impl Reading {
     /// The files that [`read`](Self::read) reads for `name`.
     pub(super) fn inputs(&self, name: &str) -> Vec<PathBuf> {
         if name.starts_with("curet:") {
-            return Source::find(self.data.as_deref()).map_or_else(|_| Vec::new(), |s| s.files());
+            return Source::find(self.folder.data.as_deref())
+                .map_or_else(|_| Vec::new(), |s| s.files());
         }
         if name.starts_with("synthetic:") {
             return Vec::new();
@@ -209,7 +208,7 @@ impl Reading {
     }
 
     fn curet(&self, material: &str) -> Result<Material, Failure> {
-        let source = Source::find(self.data.as_deref())?;
+        let source = Source::find(self.folder.data.as_deref())?;
         let ids = source.select(material)?;
         let &[id] = ids.as_slice() else {
             return Err(Failure::Usage(format!(

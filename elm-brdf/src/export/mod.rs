@@ -13,14 +13,14 @@
 //! ```
 //! use elm::{Activation, ElmParams, solve::Ridge};
 //! use elm_brdf::export::{Language, source};
-//! use elm_brdf::{features::Features, link::Link, model::BrdfParams};
+//! use elm_brdf::{features::Features, target_transform::TargetTransform, model::BrdfParams};
 //! use elm_datasets::{Invalid, MaterialId, synthetic};
 //!
 //! let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
 //! let samples = data.samples(0).ok_or("no such material")?;
 //! let params = BrdfParams {
 //!     features: Features::ReciprocalCosines,
-//!     link: Link::default_log(),
+//!     transform: TargetTransform::default_log(),
 //!     network: ElmParams::new(40).with_activation(Activation::Sine).with_solver(Ridge::leave_one_out()),
 //! };
 //! let model = params.fit_model(&samples.directions, samples.values.view())?;
@@ -103,14 +103,7 @@ impl FromStr for Format {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|format| format.name() == name)
-            .ok_or_else(|| Error::UnknownName {
-                what: "format",
-                name: name.to_owned(),
-                expected: Self::ALL.map(Self::name).join(", "),
-            })
+        Error::find("format", name, Self::ALL, Self::name)
     }
 }
 

@@ -3,8 +3,8 @@
 
 use super::error::ExportError;
 use crate::features::Features;
-use crate::link::Channel;
 use crate::model::BrdfModel;
+use crate::target_transform::Channel;
 
 /// A model ready to be written.
 pub(super) struct Network {
@@ -22,7 +22,7 @@ pub(super) struct Neuron {
     pub(super) weights: Vec<f32>,
     pub(super) bias: f32,
     /// In weighted inputs; `None` where the function is of the sum.
-    pub(super) centre: Option<Vec<f32>>,
+    pub(super) center: Option<Vec<f32>>,
     /// Output weights.
     pub(super) beta: Vec<f32>,
 }
@@ -30,7 +30,7 @@ pub(super) struct Neuron {
 impl Neuron {
     /// Whether two can be computed side by side: radial neurons of one group share their weights.
     pub(super) fn is_like(&self, other: &Self) -> bool {
-        let (own, others) = (self.centre.is_some(), other.centre.is_some());
+        let (own, others) = (self.center.is_some(), other.center.is_some());
         self.activation == other.activation
             && own == others
             && (!own || self.weights == other.weights)
@@ -42,7 +42,7 @@ pub(super) struct Output {
     pub(super) constant: f32,
     /// Weights of the inputs themselves.
     pub(super) linear: Vec<f32>,
-    pub(super) link: Channel,
+    pub(super) transform: Channel,
 }
 
 impl Network {
@@ -81,10 +81,10 @@ impl Network {
             if let Some(scales) = group.input_scales() {
                 // |s (x - mean) factor - c| with the centre taken to the inputs as they come.
                 let weights: Vec<f64> = (0..inputs).map(|i| scales[i] * scale(i)).collect();
-                let centre = (0..inputs).map(|i| own[i] + weights[i] * mean(i));
+                let center = (0..inputs).map(|i| own[i] + weights[i] * mean(i));
                 neurons.push(Neuron {
                     activation: activation.to_owned(),
-                    centre: Some(singles("a centre", &centre.collect::<Vec<_>>())?),
+                    center: Some(singles("a centre", &center.collect::<Vec<_>>())?),
                     weights: singles("a scale", &weights)?,
                     bias: 0.0,
                     beta: singles("an output weight", &betas)?,
@@ -101,7 +101,7 @@ impl Network {
                 activation: activation.to_owned(),
                 weights: singles("a hidden weight", &weights)?,
                 bias: single("a hidden bias", bias)?,
-                centre: None,
+                center: None,
                 beta: singles("an output weight", &betas)?,
             });
         }
@@ -116,22 +116,22 @@ impl Network {
                 &beta.row(hidden.neurons() + input).to_vec(),
             );
         }
-        let order = |neuron: &Neuron| (neuron.activation.clone(), neuron.centre.is_some());
+        let order = |neuron: &Neuron| (neuron.activation.clone(), neuron.center.is_some());
         neurons.sort_by_key(order);
 
         let outputs = constants
             .into_iter()
             .zip(linear)
-            .zip(model.link().by_channel());
+            .zip(model.target_transform().by_channel());
         Ok(Self {
             inputs: model.features().inputs().to_vec(),
             neurons,
             outputs: outputs
-                .map(|((constant, linear), &link)| {
+                .map(|((constant, linear), &transform)| {
                     Ok(Output {
                         constant: single("an intercept", constant)?,
                         linear: singles("a direct link", &linear)?,
-                        link,
+                        transform,
                     })
                 })
                 .collect::<Result<_, ExportError>>()?,
@@ -141,7 +141,9 @@ impl Network {
 
 /// Weights of the inputs of a grain along x, for those of one along another direction.
 fn turned(features: Features, mut weights: Vec<f64>) -> Vec<f64> {
-    if let (Features::Grain { .. }, [.., cos_weight, sin_weight]) = (features, &mut weights[..]) {
+    if let (Features::Anisotropic { .. }, [.., cos_weight, sin_weight]) =
+        (features, &mut weights[..])
+    {
         let (sin, cos) = (2.0 * features.azimuth()).sin_cos();
         (*cos_weight, *sin_weight) = (
             cos * *cos_weight - sin * *sin_weight,

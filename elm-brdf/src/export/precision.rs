@@ -100,11 +100,10 @@ impl BrdfModel {
         let targets = self.network().predict(&self.features().compute(pairs))?;
         let values = |targets: Array2<f64>| -> Result<Array2<f64>> {
             // A number beyond single precision is not one of the model's.
-            Ok(self.link().to_values(targets)?.mapv(
-                |value| {
-                    if value.is_finite() { value } else { 0.0 }
-                },
-            ))
+            Ok(self
+                .target_transform()
+                .to_values(targets)?
+                .mapv(|value| if value.is_finite() { value } else { 0.0 }))
         };
         let found = values(single.clone())?;
         let (above, below) = (values(&targets + spread)?, values(&targets - spread)?);
@@ -191,13 +190,13 @@ fn functions(network: &Network) -> Result<Vec<Activation<f32>>, ExportError> {
 fn neurons(neurons: &[Neuron], functions: &[Activation<f32>], x: &[f32]) -> Vec<(f32, f64)> {
     let one = |(neuron, function): (&Neuron, &Activation<f32>)| {
         let (mut z, mut size) = (neuron.bias, f64::from(neuron.bias.abs()));
-        match &neuron.centre {
-            Some(centre) => {
-                for ((weight, x), centre) in neuron.weights.iter().zip(x).zip(centre) {
-                    let part = weight * x - centre;
+        match &neuron.center {
+            Some(center) => {
+                for ((weight, x), center) in neuron.weights.iter().zip(x).zip(center) {
+                    let part = weight * x - center;
                     z += part * part;
                     // A distance moves by no more than what it is the length of.
-                    size += f64::from((weight * x).abs() + centre.abs());
+                    size += f64::from((weight * x).abs() + center.abs());
                 }
                 z = z.sqrt();
             }

@@ -9,8 +9,8 @@ use super::inputs;
 use super::network::{Network, Neuron, Output};
 use super::precision;
 use crate::error::{Error, Result};
-use crate::link::Channel;
 use crate::model::BrdfModel;
+use crate::target_transform::Channel;
 
 /// Source of the function `NAME_eval`, with everything that it needs.
 ///
@@ -86,7 +86,7 @@ fn check_name(name: &str) -> Result<(), ExportError> {
 }
 
 /// What a caller must know of a material with a grain.
-const GRAIN: &str = "\
+const TANGENT_NOTICE: &str = "\
 // The material has a grain: +x is the surface's tangent, +y its bitangent, as azimuths were measured.
 ";
 
@@ -260,7 +260,7 @@ impl<'a> Writer<'a> {
             channels = outputs.len(),
             inputs = inputs.join("; "),
             grain = if inputs.iter().any(|input| input.contains("phi_h")) {
-                GRAIN
+                TANGENT_NOTICE
             } else {
                 ""
             },
@@ -328,12 +328,12 @@ impl<'a> Writer<'a> {
         for group in self.groups() {
             let function = format!("{}_{}", self.name, identifier(&group[0].activation));
             for neurons in group.chunks(4) {
-                let sum = if group[0].centre.is_some() {
-                    let of = |n: &Neuron, i: usize| n.centre.as_ref().map_or(0.0, |c| c[i]);
+                let sum = if group[0].center.is_some() {
+                    let of = |n: &Neuron, i: usize| n.center.as_ref().map_or(0.0, |c| c[i]);
                     for i in 0..inputs.len() {
                         let weights = four(&|n| n.weights[i], neurons);
-                        let centres = four(&|n| of(n, i), neurons);
-                        let apart = format!("{weights} * x{i} - {centres}");
+                        let centers = four(&|n| of(n, i), neurons);
+                        let apart = format!("{weights} * x{i} - {centers}");
                         let name = format!("p{count}_{i}");
                         self.line(&language.define(language.four(), &name, &apart));
                     }
@@ -378,7 +378,7 @@ impl<'a> Writer<'a> {
             .iter()
             .map(|n| {
                 let bias = std::iter::once(&n.bias);
-                n.centre
+                n.center
                     .as_ref()
                     .unwrap_or(&n.weights)
                     .iter()
@@ -425,7 +425,7 @@ impl<'a> Writer<'a> {
             let last = first + group.len();
             let (name, function) = (self.name, identifier(&group[0].activation));
             // How far z is, and how to come to it.
-            let (start, step, z) = if group[0].centre.is_some() {
+            let (start, step, z) = if group[0].center.is_some() {
                 let weights = group[0].weights.iter().map(|&w| language.literal(w));
                 let weights = list(weights.collect());
                 self.line(&format!("const float s{first}[{inputs}] = {{{weights}}};"));
@@ -452,7 +452,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// From the sums to the value, by the link's inverse.
+    /// From the sums to the value, by the transform's inverse.
     fn close(&mut self) {
         let language = self.language;
         let value = |index: usize, output: &Output| {
@@ -469,7 +469,7 @@ impl<'a> Writer<'a> {
                     "0.0".to_owned()
                 }
             };
-            language.expression(&match output.link {
+            language.expression(&match output.transform {
                 Channel::Identity => format!("max({t}, 0.0)"),
                 Channel::Log { offset, ceiling } => {
                     bounded(format!("{} * (exp({t}) - 1.0)", number(offset)), ceiling)

@@ -18,7 +18,7 @@ pub(super) fn draw(brdf: &dyn Brdf) -> Result<String> {
     // Up to next to the horizon on both sides.
     let degrees: Vec<f64> = (-178..=178).map(|half| f64::from(half) / 2.0).collect();
     let mut lobes = Vec::new();
-    for (light, colour) in LIGHTS {
+    for (light, color) in LIGHTS {
         let pairs: Vec<DirectionPair> = degrees
             .iter()
             .map(|viewer| DirectionPair {
@@ -39,7 +39,7 @@ pub(super) fn draw(brdf: &dyn Brdf) -> Result<String> {
             })
             .map(|value| value.max(0.0))
             .collect();
-        lobes.push((light, colour, values));
+        lobes.push((light, color, values));
     }
     let most = lobes
         .iter()
@@ -75,7 +75,7 @@ pub(super) fn draw(brdf: &dyn Brdf) -> Result<String> {
         "<path d='M{0},0H{1}M0,0V{0}' stroke='#3a3d46' fill='none'/>",
         -RADIUS, RADIUS
     );
-    for (light, colour, values) in &lobes {
+    for (light, color, values) in &lobes {
         let points: Vec<String> = degrees
             .iter()
             .zip(values)
@@ -83,10 +83,10 @@ pub(super) fn draw(brdf: &dyn Brdf) -> Result<String> {
             .collect();
         let _ = write!(
             svg,
-            "<path d='M0,0L{}' stroke='{colour}' stroke-dasharray='3 4'/>\
+            "<path d='M0,0L{}' stroke='{color}' stroke-dasharray='3 4'/>\
              <text x='0' y='0' transform='translate({})' text-anchor='middle' \
-             fill='{colour}'>{light}°</text>\
-             <path d='M0,0L{}Z' fill='{colour}' fill-opacity='0.13' stroke='{colour}' \
+             fill='{color}'>{light}°</text>\
+             <path d='M0,0L{}Z' fill='{color}' fill-opacity='0.13' stroke='{color}' \
              stroke-width='1.6' stroke-linejoin='round'/>",
             point(-light, RADIUS),
             point(-light, RADIUS + 11.0),

@@ -82,13 +82,13 @@ pub fn sphere(
     viewer: [f64; 3],
     up: [f64; 3],
     light: [f64; 3],
-) -> Result<Scene<Shown>> {
+) -> Result<Scene<NoTable>> {
     let position = viewer.map(|c| 5.0 * c);
     let text = format!(
         "[image]\nwidth = {size}\nheight = {size}\nsamples = {samples}\n\
          [camera]\nposition = {position:?}\ntarget = [0, 0, 0]\nup = {up:?}\nheight = {height}\n\
-         [material.shown]\n\
-         [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'shown'\n\
+         [material.model]\n\
+         [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = 'model'\n\
          [[directional]]\ntowards = {light:?}\n\
          irradiance = [{IRRADIANCE}, {IRRADIANCE}, {IRRADIANCE}]\n",
         height = 2.0 * HALF_HEIGHT
@@ -99,7 +99,7 @@ pub fn sphere(
 /// The material of [`sphere`], of which there is nothing to say.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Shown {}
+pub struct NoTable {}
 
 /// The one model of [`sphere`].
 pub struct SingleMaterial<'a>(
@@ -107,8 +107,8 @@ pub struct SingleMaterial<'a>(
     pub &'a BrdfModel,
 );
 
-impl MaterialLoader<Shown> for SingleMaterial<'_> {
-    fn load(&self, _: &Shown, _: &Path) -> Result<LoadedMaterial, LoadError> {
+impl MaterialLoader<NoTable> for SingleMaterial<'_> {
+    fn load(&self, _: &NoTable, _: &Path) -> Result<LoadedMaterial, LoadError> {
         let packed = Packed::<f64>::new(self.0)?;
         Ok(LoadedMaterial::new(Box::new(packed), ""))
     }

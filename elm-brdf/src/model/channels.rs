@@ -51,7 +51,7 @@ impl BrdfModel {
         let mut provenance = self.provenance.clone();
         provenance.channels = places.map(|p| self.provenance.channels[p].clone()).to_vec();
         Ok(Self {
-            link: self.link.select(&places),
+            transform: self.transform.select(&places),
             network,
             provenance,
             ..self.clone()

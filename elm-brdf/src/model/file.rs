@@ -9,13 +9,13 @@ use serde::{Deserialize, Serialize};
 use super::{BrdfModel, Layer, Provenance};
 use crate::error::{Error, Result};
 use crate::features::Features;
-use crate::link::FittedLink;
+use crate::target_transform::FittedTransform;
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct File {
     provenance: Provenance,
     features: Features,
-    link: FittedLink,
+    transform: FittedTransform,
     layer: Layer,
     scaler: Option<Scaler<f64>>,
     direct_links: bool,
@@ -28,7 +28,7 @@ impl From<BrdfModel> for File {
         Self {
             provenance: model.provenance,
             features: model.features,
-            link: model.link,
+            transform: model.transform,
             layer: model.layer,
             scaler: model.network.scaler().cloned(),
             direct_links: model.network.map().direct_links(),
@@ -52,9 +52,9 @@ impl TryFrom<File> for BrdfModel {
         for (what, expected, found) in [
             ("inputs of the network", inputs, network.inputs()),
             (
-                "channels of the link",
+                "channels of the transform",
                 network.outputs(),
-                file.link.channels(),
+                file.transform.channels(),
             ),
         ] {
             if expected != found {
@@ -65,11 +65,11 @@ impl TryFrom<File> for BrdfModel {
                 });
             }
         }
-        file.link.check()?;
+        file.transform.check()?;
         Ok(Self {
             provenance: file.provenance,
             features: file.features,
-            link: file.link,
+            transform: file.transform,
             layer: file.layer,
             network,
         })

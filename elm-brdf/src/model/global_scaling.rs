@@ -6,7 +6,7 @@ use ndarray::{Array2, ArrayView2};
 use super::{BrdfModel, BrdfParams};
 use crate::error::{Error, Result};
 use crate::fit::Fit;
-use crate::link::Link;
+use crate::target_transform::TargetTransform;
 use elm_datasets::geometry::DirectionPair;
 
 /// [`BrdfParams`] that are cross-validated with their inputs standardised once, on all
@@ -21,14 +21,14 @@ pub struct GlobalScaling(BrdfParams);
 
 impl GlobalScaling {
     /// # Errors
-    /// [`Error::Conflict`] for a link other than [`Link::Identity`], which is fitted to each
+    /// [`Error::Conflict`] for a transform other than [`TargetTransform::Identity`], which is fitted to each
     /// fold's values.
     pub fn new(params: BrdfParams) -> Result<Self> {
-        if params.link == Link::Identity {
+        if params.transform == TargetTransform::Identity {
             return Ok(Self(params));
         }
         Err(Error::Conflict {
-            first: "a link other than identity",
+            first: "a target transform other than identity",
             second: "inputs scaled once",
         })
     }

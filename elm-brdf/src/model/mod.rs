@@ -1,4 +1,4 @@
-//! An extreme learning machine as a reflectance model: features, link and network.
+//! An extreme learning machine as a reflectance model: features, target transform and network.
 //!
 //! [`BrdfParams`] are settings, all of them the caller's; [`Tuned`] chooses what it is not told.
 //! Both make a [`BrdfModel`], which [`save`](BrdfModel::save) keeps in a file.
@@ -6,7 +6,7 @@
 //! # Where nothing was measured
 //! Below either horizon a model is black. Between the last measured angle and grazing it goes on as
 //! its network does, which for inputs that are bounded (all sets are) is a bounded continuation; the
-//! [link](crate::link) keeps it between 0 and [`Link::HEADROOM`](crate::link::Link::HEADROOM) times
+//! [target transform](crate::target_transform) keeps it between 0 and [`TargetTransform::HEADROOM`] times
 //! the largest value measured. It is finite for every pair of directions.
 
 mod channels;
@@ -27,14 +27,14 @@ use serde::{Deserialize, Serialize};
 use crate::error::Result;
 use crate::features::Features;
 use crate::fit::{Fit, Model, assign, check};
-use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
+use crate::target_transform::{FittedTransform, TargetTransform};
 use elm_datasets::Brdf;
 use elm_datasets::brdf::check_directions;
 use elm_datasets::geometry::DirectionPair;
 pub use global_scaling::GlobalScaling;
 pub use layer::{Draw, Layer};
-pub use tuned::{Lean, SideBySide, Tuned};
+pub use tuned::{Compact, SideBySide, Tuned};
 
 /// What a [`BrdfModel`] is made of.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,7 +42,7 @@ pub struct BrdfParams {
     /// Inputs of the network.
     pub features: Features,
     /// Targets of the network.
-    pub link: Link,
+    pub transform: TargetTransform,
     /// The network.
     pub network: ElmParams<f64>,
 }
@@ -65,7 +65,7 @@ pub struct BrdfParams {
 #[serde(try_from = "file::File", into = "file::File")]
 pub struct BrdfModel {
     features: Features,
-    link: FittedLink,
+    transform: FittedTransform,
     layer: Layer,
     network: Elm<f64>,
     provenance: Provenance,
@@ -98,13 +98,13 @@ impl BrdfModel {
     /// Puts a model together; `network` must have the layer that `layer` draws.
     pub(crate) fn new(
         features: Features,
-        link: FittedLink,
+        transform: FittedTransform,
         layer: Layer,
         network: Elm<f64>,
     ) -> Self {
         Self {
             features,
-            link,
+            transform,
             layer,
             network,
             provenance: Provenance::default(),
@@ -127,8 +127,8 @@ impl BrdfModel {
 
     /// What turns the network's outputs into BRDF values.
     #[must_use]
-    pub fn link(&self) -> &FittedLink {
-        &self.link
+    pub fn target_transform(&self) -> &FittedTransform {
+        &self.transform
     }
 
     /// The fitted network.
@@ -151,14 +151,14 @@ impl BrdfModel {
     }
 
     /// All numbers that a file must hold to evaluate the model: output weights, constants, scales,
-    /// links, which neurons were kept (32 to a number), but no weights that a seed regenerates.
+    /// transforms, which neurons were kept (32 to a number), but no weights that a seed regenerates.
     #[must_use]
     pub fn stored_floats(&self) -> usize {
         let scaler = self.network.scaler().map_or(0, |s| 2 * s.mean().len());
         self.network.beta().len()
             + self.network.outputs()
             + scaler
-            + self.link.channels() * self.link.floats_per_channel()
+            + self.transform.channels() * self.transform.floats_per_channel()
             + self.layer.stored_floats()
     }
 
@@ -187,7 +187,7 @@ impl BrdfParams {
     pub fn paper(neurons: usize) -> Self {
         Self {
             features: Features::Paper,
-            link: Link::Identity,
+            transform: TargetTransform::Identity,
             network: ElmParams::new(neurons)
                 .with_activation(Activation::Sigmoid)
                 .with_solver(PseudoInverse::default())
@@ -213,12 +213,12 @@ impl BrdfParams {
     ) -> Result<BrdfModel> {
         check(pairs, values)?;
         let x = self.features.compute_training(pairs);
-        let link = self.link.fit(values)?;
-        let t = link.to_targets(values)?;
+        let transform = self.transform.fit(values)?;
+        let t = transform.to_targets(values)?;
         // Directions are bounded by themselves, and measurements end short of the horizon.
         let network = self.network.clone().with_bounded(false).fit(&x, &t)?;
         let layer = Layer::of(self.network.feature_map(), network.hidden());
-        Ok(BrdfModel::new(self.features, link, layer, network))
+        Ok(BrdfModel::new(self.features, transform, layer, network))
     }
 }
 
@@ -234,7 +234,7 @@ impl BrdfModel {
     fn values_at(&self, pairs: &[DirectionPair]) -> Result<Array2<f64>> {
         check_directions(pairs)?;
         let targets = self.network.predict(&self.features.compute(pairs))?;
-        let mut values = self.link.to_values(targets)?;
+        let mut values = self.transform.to_values(targets)?;
         for (mut row, pair) in values.rows_mut().into_iter().zip(pairs) {
             if !pair.is_above_horizon() {
                 row.fill(0.0);
@@ -275,7 +275,7 @@ impl Model for BrdfModel {
     fn floats_per_channel(&self) -> usize {
         // What channels share counts whole for each.
         let outputs = self.network.outputs().max(1);
-        let own = self.network.beta().nrows() + 1 + self.link.floats_per_channel();
+        let own = self.network.beta().nrows() + 1 + self.transform.floats_per_channel();
         own + self.stored_floats() - own * outputs
     }
 }

@@ -1,19 +1,19 @@
 //! A reflectance model whose settings are chosen by held-out errors.
 
+mod albedo_check;
 mod anchors;
+mod anisotropy;
 mod censored;
+mod compact;
 mod distill;
 mod errors;
-mod few;
 mod finish;
-mod grain;
-mod lean;
+mod large_data;
 mod limit;
-mod many;
-mod moments;
+mod normal_equations;
 mod problem;
 mod rows;
-mod survey;
+mod small_data;
 
 use elm::advanced::FeatureMap;
 
@@ -25,13 +25,13 @@ use super::{BrdfModel, Draw, Provenance};
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::fit::{Fit, Model, check};
-use crate::link::{FittedLink, Link};
 use crate::metrics::Metric;
 use crate::quality;
+use crate::target_transform::{FittedTransform, TargetTransform};
+pub use compact::Compact;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::DirectionPair;
 use finish::Finished;
-pub use lean::Lean;
 use problem::Problem;
 
 /// Fits a network and chooses what is left open: inputs, the scale of each input, regularisation,
@@ -66,7 +66,7 @@ use problem::Problem;
 /// Rows are weighted by what the metric makes of an error, and the error that single precision would make
 /// counts in the choice of the strength. A network whose [albedo](crate::albedo) is physical, at no
 /// angle above 1 unless that of the nearest measurements is, is taken before any other. Noise of dark
-/// values is accounted for: the link's offset is at least three of its standard deviations, and where
+/// values is accounted for: the transform's offset is at least three of its standard deviations, and where
 /// RMSE is asked for the fit is of the mean value, not of the value of the mean target.
 ///
 /// **Size**, unless it is given: at most 213 neurons, which for three channels is 675 stored numbers; no more
@@ -151,39 +151,44 @@ impl Tuned {
         values: ArrayView2<'_, f64>,
     ) -> Result<BrdfModel> {
         check(pairs, values)?;
-        let mut link = Link::default_log().fit(values)?;
+        let mut transform = TargetTransform::default_log().fit(values)?;
         let direction = match self.features {
             Some(set) if set.is_isotropic() => None,
-            _ => grain::detect(pairs, link.to_targets(values)?.view())?,
+            _ => anisotropy::detect(pairs, transform.to_targets(values)?.view())?,
         };
         if pairs.len() > Self::LIMIT {
-            let rows = many::search_rows(self, pairs.len());
+            let rows = large_data::search_rows(self, pairs.len());
             let sets = self.sets(&Self::MANY_SETS, direction);
-            let mut settings = many::search(self, &link, pairs, values, &rows, &sets)?;
-            let noise = settings.first().map_or(Vec::new(), many::Setting::noise);
-            let raised = link.raise_offsets(&noise);
+            let mut settings = large_data::search(self, &transform, pairs, values, &rows, &sets)?;
+            let noise = settings
+                .first()
+                .map_or(Vec::new(), large_data::Setting::noise);
+            let raised = transform.raise_offsets(&noise);
             if raised.iter().any(|&factor| factor > 1.0) {
-                settings = many::search(self, &link, pairs, values, &rows, &sets)?;
+                settings = large_data::search(self, &transform, pairs, values, &rows, &sets)?;
             }
-            let grain = settings.first().is_some_and(many::Setting::has_grain);
-            let problem = self.problem(pairs, values, link, noise, &raised, grain)?;
-            let found = many::best(&problem, &settings, &rows)?;
+            let anisotropic = settings
+                .first()
+                .is_some_and(large_data::Setting::is_anisotropic);
+            let problem = self.problem(pairs, values, transform, noise, &raised, anisotropic)?;
+            let found = large_data::best(&problem, &settings, &rows)?;
             return model_of(&problem, found);
         }
-        let mut search = few::Search::new(self, pairs, values, &link, direction)?;
-        let noise = search.noise(&link)?;
-        let raised = link.raise_offsets(&noise);
+        let mut search = small_data::Search::new(self, pairs, values, &transform, direction)?;
+        let noise = search.noise(&transform)?;
+        let raised = transform.raise_offsets(&noise);
         if raised.iter().any(|&factor| factor > 1.0) {
-            search = few::Search::new(self, pairs, values, &link, direction)?;
+            search = small_data::Search::new(self, pairs, values, &transform, direction)?;
         }
-        let grain = search.has_grain();
-        let problem = self.problem(pairs, values, link, noise, &raised, grain)?;
+        let anisotropic = search.is_anisotropic();
+        let problem = self.problem(pairs, values, transform, noise, &raised, anisotropic)?;
         let mut found = search.best(&problem)?;
         if pairs.len() > Self::FEW {
-            let rows = many::search_rows(self, pairs.len());
+            let rows = large_data::search_rows(self, pairs.len());
             let sets = self.sets(&Self::FEW_SETS, direction);
-            let settings = many::search(self, &problem.link, pairs, values, &rows, &sets)?;
-            let other = many::best(&problem, &settings, &rows)?;
+            let settings =
+                large_data::search(self, &problem.transform, pairs, values, &rows, &sets)?;
+            let other = large_data::best(&problem, &settings, &rows)?;
             if problem.noisy && other.excess <= found.excess {
                 // Of noisy rows all count, and the limit has some of them.
                 found = other;
@@ -198,13 +203,13 @@ impl Tuned {
         &'a self,
         pairs: &'a [DirectionPair],
         values: ArrayView2<'a, f64>,
-        link: FittedLink,
+        transform: FittedTransform,
         noise: Vec<f64>,
         raised: &[f64],
-        grain: bool,
+        anisotropic: bool,
     ) -> Result<Problem<'a>> {
         let noisy = raised.iter().any(|&factor| factor > NOISY);
-        Problem::new(self, pairs, values, link, noise, noisy, grain)
+        Problem::new(self, pairs, values, transform, noise, noisy, anisotropic)
     }
 
     /// The sets of inputs to choose among: one where it is given; else these, and those of a grain where one
@@ -247,7 +252,7 @@ impl Tuned {
         let Some(most) = self.most_floats(rows, channels) else {
             return Ok(wanted);
         };
-        // Mean, factor and scale of each input; constant and link of each channel.
+        // Mean, factor and scale of each input; constant and transform of each channel.
         let fixed = 3 * inputs + 3 * channels;
         let floats = |neurons: usize| fixed + channels * neurons + drawn(neurons).div_ceil(32);
         let largest = match (self.neurons, self.max_floats) {
@@ -265,13 +270,13 @@ impl Tuned {
             (None, Some(_)) => Err(Error::Parameter {
                 name: "max_floats",
                 value: most as f64,
-                expected: "enough for the scales, the links and one neuron: some 20 and more",
+                expected: "enough for input scales, target transforms and one neuron: about 20 or more",
             }),
         }
     }
 
     /// Sine neurons of normal frequencies at three scales: heavier tails than one scale has.
-    fn waves(&self, neurons: usize, input_scales: &[f64]) -> ElmParams<f64> {
+    fn sine_features(&self, neurons: usize, input_scales: &[f64]) -> ElmParams<f64> {
         let third = neurons / 3;
         let params = ElmParams::new(neurons - 2 * third)
             .with_activation(Activation::Sine)
@@ -381,7 +386,7 @@ impl Drawn {
     }
 }
 
-/// Noise counts as large where it raises a link's offset by more than this: from a sixth of the median
+/// Noise counts as large where it raises a transform's offset by more than this: from a sixth of the median
 /// value on.
 const NOISY: f64 = 5.0;
 /// How much worse a reciprocal network may be and still be taken.
@@ -427,7 +432,7 @@ fn model_of(problem: &Problem<'_>, finished: Finished) -> Result<BrdfModel> {
         tuned,
         pairs,
         values,
-        link,
+        transform,
         ..
     } = problem;
     let mut about = provenance(tuned.seed, tuned.metric, pairs, *values);
@@ -438,7 +443,7 @@ fn model_of(problem: &Problem<'_>, finished: Finished) -> Result<BrdfModel> {
         network,
         ..
     } = finished;
-    Ok(BrdfModel::new(features, link.clone(), layer, network).with_provenance(about))
+    Ok(BrdfModel::new(features, transform.clone(), layer, network).with_provenance(about))
 }
 
 /// What is known of measurements whatever is fitted to them.

@@ -22,6 +22,7 @@ use crate::fit::Model;
 use crate::metrics::{Metric, Metrics};
 use crate::model::BrdfModel;
 use crate::registry::Candidate;
+use crate::statistics::median;
 use elm_datasets::geometry::DirectionPair;
 
 /// Measurements to fit to, and others of the same material that judge.
@@ -122,7 +123,7 @@ pub fn run(
                 }
             }
         }
-        let fit_seconds = timing::median(seconds);
+        let fit_seconds = median(seconds).unwrap_or(0.0);
         points.extend(errors.into_iter().map(|(model, errors)| CostPoint {
             model,
             error: errors.iter().sum::<f64>() / errors.len() as f64,

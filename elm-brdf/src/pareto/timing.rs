@@ -8,6 +8,7 @@ use crate::baselines::Nbrdf;
 use crate::batch::{Batched, Columns, Packed, Precision, Real};
 use crate::error::Result;
 use crate::fit::Model;
+use crate::statistics::median;
 use elm_datasets::geometry::DirectionPair;
 
 /// Pairs in a batch: its directions and values stay in the second-level cache.
@@ -48,7 +49,10 @@ pub(super) fn take_turns(models: &[Box<dyn Model>], pairs: &[DirectionPair]) -> 
             times.push(timed.seconds(*passes)? / evaluations as f64 * 1e9);
         }
     }
-    Ok(all.into_iter().map(|(_, _, times)| median(times)).collect())
+    Ok(all
+        .into_iter()
+        .map(|(_, _, times)| median(times).unwrap_or(0.0))
+        .collect())
 }
 
 /// The model for directions in columns, where it is packed for them.
@@ -115,10 +119,4 @@ impl<'a> Timed<'a> {
         }
         Ok(start.elapsed().as_secs_f64())
     }
-}
-
-/// The middle value, or the upper of the two in the middle; 0 of none.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

@@ -4,11 +4,11 @@ use elm::solve::Ridge;
 
 use super::{CostClass, ModelEntry};
 use crate::baselines::{
-    Analytic, GaussianProcess, Koenderink, Neighbours, Radial, RadialBasis, Smoothing,
+    Analytic, GaussianProcess, Koenderink, Neighbors, Radial, RadialBasis, Smoothing,
 };
 use crate::features::Features;
 use crate::fit::{AnyFit, boxed};
-use crate::link::Link;
+use crate::target_transform::TargetTransform;
 
 /// Every baseline: the analytic models, Koenderink's basis, and the interpolators on the paper's
 /// inputs and target, on the inputs and target that suit them best, and, for those that gain by
@@ -25,7 +25,7 @@ pub(crate) fn with_candidates(candidates: usize) -> Vec<ModelEntry> {
         .map(|model| ModelEntry {
             name: model.name().to_owned(),
             features: None,
-            link: None,
+            transform: None,
             cost: CostClass::Grid,
             network: false,
             method: boxed(model),
@@ -34,7 +34,7 @@ pub(crate) fn with_candidates(candidates: usize) -> Vec<ModelEntry> {
     all.extend([2, 8].map(|order| ModelEntry {
         name: format!("koenderink-{order}"),
         features: None,
-        link: None,
+        transform: None,
         cost: CostClass::Linear,
         network: false,
         // Order 8 overfits without: 55 coefficients, some 185 measurements.
@@ -43,29 +43,33 @@ pub(crate) fn with_candidates(candidates: usize) -> Vec<ModelEntry> {
             solver: Ridge::leave_one_out().into(),
         }),
     }));
-    for (features, link) in [
-        (Features::Paper, Link::Identity),
-        (Features::Paper, Link::default_log()),
-        (Features::Cosines, Link::default_log()),
-        (Features::ReciprocalCosines, Link::default_log()),
+    for (features, transform) in [
+        (Features::Paper, TargetTransform::Identity),
+        (Features::Paper, TargetTransform::default_log()),
+        (Features::Cosines, TargetTransform::default_log()),
+        (Features::ReciprocalCosines, TargetTransform::default_log()),
     ] {
-        all.extend(interpolators(features, link, candidates));
+        all.extend(interpolators(features, transform, candidates));
     }
     all
 }
 
-fn interpolators(features: Features, link: Link, candidates: usize) -> Vec<ModelEntry> {
-    let neighbours = |count| -> Box<AnyFit> {
-        boxed(Neighbours {
+fn interpolators(
+    features: Features,
+    transform: TargetTransform,
+    candidates: usize,
+) -> Vec<ModelEntry> {
+    let neighbors = |count| -> Box<AnyFit> {
+        boxed(Neighbors {
             features,
-            link,
+            transform,
             count,
         })
     };
     let radial = |radial, smoothing| -> Box<AnyFit> {
         boxed(RadialBasis {
             features,
-            link,
+            transform,
             radial,
             smoothing,
         })
@@ -73,9 +77,9 @@ fn interpolators(features: Features, link: Link, candidates: usize) -> Vec<Model
     use CostClass::{Cubic, Linear, ManyCubic};
     use Smoothing::{Exact, LeaveOneOut};
     let methods = [
-        ("nearest", Linear, neighbours(1)),
-        ("inverse-distance-5", Linear, neighbours(5)),
-        ("inverse-distance-all", Linear, neighbours(usize::MAX)),
+        ("nearest", Linear, neighbors(1)),
+        ("inverse-distance-5", Linear, neighbors(5)),
+        ("inverse-distance-all", Linear, neighbors(usize::MAX)),
         ("thin-plate", Cubic, radial(Radial::ThinPlate, Exact)),
         (
             "thin-plate-smoothed",
@@ -89,7 +93,7 @@ fn interpolators(features: Features, link: Link, candidates: usize) -> Vec<Model
             ManyCubic,
             boxed(GaussianProcess {
                 candidates,
-                ..GaussianProcess::new(features, link)
+                ..GaussianProcess::new(features, transform)
             }),
         ),
     ];
@@ -98,7 +102,7 @@ fn interpolators(features: Features, link: Link, candidates: usize) -> Vec<Model
         .map(|(name, cost, method)| ModelEntry {
             name: name.to_owned(),
             features: Some(features),
-            link: Some(link),
+            transform: Some(transform),
             cost,
             network: false,
             method,

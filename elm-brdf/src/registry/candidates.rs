@@ -5,7 +5,7 @@ use elm::Activation;
 use super::baselines;
 use crate::fit::{AnyFit, boxed};
 use crate::metrics::Metric;
-use crate::model::{BrdfParams, Lean, Tuned};
+use crate::model::{BrdfParams, Compact, Tuned};
 use crate::recipes::Joint;
 
 /// A way to fit a model, with its name.
@@ -34,12 +34,12 @@ pub fn candidates(metric: Metric, seed: u64) -> Vec<Candidate> {
                 let kind = if pruned { "pruned" } else { "drawn" };
                 all.push(Candidate {
                     name: format!("elm {activation} {neurons} {kind}"),
-                    method: boxed(Lean {
+                    method: boxed(Compact {
                         activation: activation.clone(),
                         pruned,
                         metric,
                         seed,
-                        ..Lean::new(neurons)
+                        ..Compact::new(neurons)
                     }),
                 });
             }

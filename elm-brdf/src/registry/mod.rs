@@ -14,7 +14,7 @@ pub use networks::POOLED;
 use crate::baselines::Subsampled;
 use crate::features::Features;
 use crate::fit::AnyFit;
-use crate::link::Link;
+use crate::target_transform::TargetTransform;
 
 /// A method with the words that a table needs.
 pub struct ModelEntry {
@@ -23,7 +23,7 @@ pub struct ModelEntry {
     /// Its inputs, where it is a regression over a set of them.
     pub features: Option<Features>,
     /// Its target, where it has a choice.
-    pub link: Option<Link>,
+    pub transform: Option<TargetTransform>,
     /// How its cost grows with the measurements.
     pub cost: CostClass,
     /// Whether it is one of this project's networks.
@@ -60,7 +60,11 @@ impl ModelEntry {
     #[must_use]
     pub fn full_name(&self) -> String {
         let features = self.features.map(Features::name);
-        full_name(&self.name, features, self.link.map(Link::name))
+        full_name(
+            &self.name,
+            features,
+            self.transform.map(TargetTransform::name),
+        )
     }
 
     /// With a limit to the measurements that the method is given, where its cost grows fast:

@@ -6,9 +6,9 @@ use elm::{Activation, ElmParams};
 use super::{CostClass, ModelEntry};
 use crate::features::Features;
 use crate::fit::boxed;
-use crate::link::Link;
 use crate::model::{BrdfParams, Tuned};
 use crate::prior::PriorParams;
+use crate::target_transform::TargetTransform;
 
 /// Everything chosen by held-out errors, each material by itself.
 const TUNED: &str = "elm (tuned)";
@@ -20,7 +20,7 @@ fn tuned(name: &str, seed: u64) -> ModelEntry {
         name: name.to_owned(),
         // Chosen for each material.
         features: None,
-        link: Some(Link::default_log()),
+        transform: Some(TargetTransform::default_log()),
         cost: CostClass::Linear,
         network: true,
         method: boxed(Tuned {
@@ -35,7 +35,7 @@ pub(super) fn networks(seed: u64) -> [ModelEntry; 4] {
     let entry = |name: &str, params: BrdfParams| ModelEntry {
         name: name.to_owned(),
         features: Some(params.features),
-        link: Some(params.link),
+        transform: Some(params.transform),
         cost: CostClass::Linear,
         network: true,
         method: boxed(params),
@@ -50,7 +50,7 @@ pub(super) fn networks(seed: u64) -> [ModelEntry; 4] {
             "elm (200 sine, ridge)",
             BrdfParams {
                 features: Features::Cosines,
-                link: Link::default_log(),
+                transform: TargetTransform::default_log(),
                 network: ElmParams::new(200)
                     .with_seed(seed)
                     .with_activation(Activation::Sine)

@@ -5,11 +5,12 @@ use serde::{Deserialize, Serialize};
 use comfy_table::CellAlignment;
 
 use super::tables::{Style, push, seeds, styled, trim};
-use super::{Data, Format, json, mean, paper};
+use super::{Data, Format, json, paper};
 use crate::error::{Error, Result};
 use crate::metrics::Metrics;
 use crate::protocol::{MaterialScores, Scores};
 use crate::registry::full_name;
+use crate::statistics::{deviation, mean};
 
 /// Models cross-validated on the same folds, the smallest held-out error first. Its JSON form is
 /// this structure, field for field.
@@ -163,13 +164,6 @@ impl Entry {
             self.target.as_deref(),
         )
     }
-}
-
-/// With one less than the number of values for a divisor.
-fn deviation(values: &[f64]) -> Option<f64> {
-    let middle = mean(values.iter().copied())?;
-    let squares: f64 = values.iter().map(|value| (value - middle).powi(2)).sum();
-    (values.len() > 1).then(|| (squares / (values.len() as f64 - 1.0)).sqrt())
 }
 
 impl Comparison {

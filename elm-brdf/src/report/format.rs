@@ -48,13 +48,6 @@ impl FromStr for Format {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|format| format.name() == name)
-            .ok_or_else(|| Error::UnknownName {
-                what: "format",
-                name: name.to_owned(),
-                expected: Self::ALL.map(Self::name).join(", "),
-            })
+        Error::find("format", name, Self::ALL, Self::name)
     }
 }

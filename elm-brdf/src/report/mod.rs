@@ -17,6 +17,7 @@ use crate::metrics::Metrics;
 use crate::protocol::{MaterialScores, Scores};
 use crate::published;
 use crate::quality::NoiseFloor;
+use crate::statistics::{mean, median};
 use tables::Measure;
 
 pub use comparison::{Comparison, Entry, MaterialScore, ModelLabel};
@@ -42,7 +43,7 @@ pub struct Report {
 pub struct Data {
     /// Where they come from.
     pub source: String,
-    /// Whether they are the built-in stand-in rather than measurements.
+    /// Whether they are the built-in synthetic data rather than measurements.
     pub synthetic: bool,
     /// Channel names.
     pub channels: Vec<String>,
@@ -121,7 +122,7 @@ impl Protocol {
 /// The figures of one material.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Material {
-    /// CUReT's number (or the stand-in's own).
+    /// CUReT's number (or the synthetic data's own).
     pub id: usize,
     /// Its name.
     pub name: String,
@@ -148,7 +149,7 @@ pub struct Channel {
     pub saturated: usize,
     /// What reciprocal pairs show of the noise; `None` without such pairs.
     pub noise_floor: Option<NoiseFloor>,
-    /// What the paper printed; `None` for other materials and for the stand-in.
+    /// What the paper printed; `None` for other materials and for the synthetic data.
     pub paper: Option<Paper>,
 }
 
@@ -366,27 +367,6 @@ fn quality(scores: &[MaterialScores]) -> (usize, Option<f64>) {
         channels().map(|channel| channel.saturated.len()).sum(),
         median(floors.map(|floor| floor.sigma).collect()),
     )
-}
-
-/// The middle value, or the mean of the two in the middle.
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    let upper = *values.get(middle)?;
-    Some(if values.len() % 2 == 1 {
-        upper
-    } else {
-        f64::midpoint(values[middle - 1], upper)
-    })
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (mut sum, mut count) = (0.0, 0_usize);
-    for value in values {
-        sum += value;
-        count += 1;
-    }
-    (count > 0).then(|| sum / count as f64)
 }
 
 fn json(report: &impl Serialize) -> Result<String> {

@@ -110,7 +110,7 @@ pub(super) fn render(report: &Report, style: Style) -> String {
     for measure in Measure::PAPER {
         let mark = if style == Style::Markdown { "### " } else { "" };
         let suffix = if report.data.synthetic {
-            ", SYNTHETIC stand-in data"
+            ", SYNTHETIC data"
         } else {
             ""
         };
@@ -152,7 +152,7 @@ fn heading(out: &mut String, report: &Report, style: Style) {
         push(
             out,
             format_args!(
-                "{item}SYNTHETIC stand-in data, not measurements: no CUReT files were found, so there \
+                "{item}SYNTHETIC data, not measurements: no CUReT files were found, so there \
              is nothing to compare with the paper.\n"
             ),
         );

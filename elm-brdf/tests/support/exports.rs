@@ -4,9 +4,9 @@ use elm::advanced::NeuronBlock;
 use elm::{Activation, Biases, ElmParams, NeuronGroup, solve::Ridge};
 use elm_brdf::features::Features;
 use elm_brdf::fit::Fit;
-use elm_brdf::link::Link;
 use elm_brdf::model::{BrdfModel, BrdfParams};
 use elm_brdf::recipes;
+use elm_brdf::target_transform::TargetTransform;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::{DirectionPair, cartesian};
 use elm_datasets::{Invalid, MaterialId, Samples, synthetic};
@@ -30,17 +30,17 @@ pub(crate) fn network(neurons: usize, activation: Activation<f64>) -> ElmParams<
 /// A model of everything that can be exported, each with the name of its functions.
 pub(crate) fn models() -> Vec<(String, Box<dyn Brdf>)> {
     let mut all: Vec<(BrdfParams, usize)> = Vec::new();
-    let mut add = |features, link, network, channels| {
+    let mut add = |features, transform, network, channels| {
         all.push((
             BrdfParams {
                 features,
-                link,
+                transform,
                 network,
             },
             channels,
         ));
     };
-    let log = Link::default_log();
+    let log = TargetTransform::default_log();
     for features in Features::ALL {
         add(features, log, network(30, Activation::Sine), 3);
     }
@@ -48,8 +48,13 @@ pub(crate) fn models() -> Vec<(String, Box<dyn Brdf>)> {
         // 22 neurons leave two of the last four without one.
         add(Features::Cosines, log, network(22, activation), 3);
     }
-    for link in [Link::Identity, Link::CubeRoot] {
-        add(Features::Highlight, link, network(30, Activation::Tanh), 3);
+    for transform in [TargetTransform::Identity, TargetTransform::CubeRoot] {
+        add(
+            Features::Highlight,
+            transform,
+            network(30, Activation::Tanh),
+            3,
+        );
     }
     add(
         Features::Cosines,
@@ -220,11 +225,15 @@ fn bounds(model: &BrdfModel, pairs: &[DirectionPair]) -> Vec<Option<[f64; 3]>> {
                     lipschitz + EPS * (8.0 + 2.0 * z.abs() + value.abs()),
                 );
             }
-            for link in neurons..beta.nrows() {
-                let i = link - neurons;
+            for transform in neurons..beta.nrows() {
+                let i = transform - neurons;
                 let value = factor(i) * (x(i) - mean(i));
                 let size = factor(i) * (x(i).abs() + mean(i).abs());
-                term(link, value, factor(i) * input_error(i) + 4.0 * EPS * size);
+                term(
+                    transform,
+                    value,
+                    factor(i) * input_error(i) + 4.0 * EPS * size,
+                );
             }
             let bound = |c: usize| {
                 let c = c.min(outputs - 1);
@@ -232,7 +241,7 @@ fn bounds(model: &BrdfModel, pairs: &[DirectionPair]) -> Vec<Option<[f64; 3]>> {
                 let sum = (beta.nrows() + 4) as f64 * EPS * (size[c] + t.abs());
                 let t_error = error[c] + sum;
                 let value = values[[row, c]];
-                // The slope of the link's inverse, from its values a little to both sides: it is
+                // The slope of the transform's inverse, from its values a little to both sides: it is
                 // monotonic, and the model's own target is not at hand.
                 reach(model, c, value, t_error)
             };
@@ -244,10 +253,10 @@ fn bounds(model: &BrdfModel, pairs: &[DirectionPair]) -> Vec<Option<[f64; 3]>> {
 /// How far the value may move when the target moves by `t_error`.
 fn reach(model: &BrdfModel, channel: usize, value: f64, t_error: f64) -> f64 {
     let channels = model.channels();
-    let link = model.link();
+    let transform = model.target_transform();
     let row = |value: f64| ndarray::Array2::from_elem((1, channels), value);
-    let target = link.to_targets(row(value).view()).unwrap()[[0, channel]];
-    let at = |t: f64| link.to_values(row(t)).unwrap()[[0, channel]];
+    let target = transform.to_targets(row(value).view()).unwrap()[[0, channel]];
+    let at = |t: f64| transform.to_values(row(t)).unwrap()[[0, channel]];
     let reach = (at(target + t_error) - at(target)).max(at(target) - at(target - t_error));
     // The exponential and what follows it, of a value a little larger than the result.
     let scale = value.abs() + (at(target + 1.0) - at(target)).abs();

@@ -36,10 +36,10 @@ pub const MEASUREMENTS: usize = 205;
 pub const TABLE: &str = "table.txt";
 
 /// The files of the values: the mean of the channels, red, green and blue.
-pub const VALUES: [&str; 4] = [AVERAGE[0].1, COLOURS[0].1, COLOURS[1].1, COLOURS[2].1];
+pub const VALUES: [&str; 4] = [AVERAGE[0].1, COLORS[0].1, COLORS[1].1, COLORS[2].1];
 
 const AVERAGE: [(&str, &str); 1] = [("average", "abrdf.dat")];
-const COLOURS: [(&str, &str); 3] = [
+const COLORS: [(&str, &str); 3] = [
     ("red", "rbrdf.dat"),
     ("green", "gbrdf.dat"),
     ("blue", "bbrdf.dat"),
@@ -55,12 +55,12 @@ pub fn is_present(dir: &Path) -> bool {
 /// The most telling complete set of channels in `dir`, as (channel, file) pairs.
 fn value_files(dir: &Path) -> Result<&'static [(&'static str, &'static str)], Error> {
     let there = |&(_, file): &(&str, &str)| dir.join(file).is_file();
-    if COLOURS.iter().all(there) {
-        Ok(&COLOURS)
+    if COLORS.iter().all(there) {
+        Ok(&COLORS)
     } else if AVERAGE.iter().all(there) {
         Ok(&AVERAGE)
     } else {
-        let found = COLOURS
+        let found = COLORS
             .iter()
             .filter(|pair| there(pair))
             .map(|&(_, file)| file)

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::parse::{Wrong, check_angles};
-use super::{AVERAGE, COLOURS, MATERIALS, MEASUREMENTS, MaterialId, TABLE};
+use super::{AVERAGE, COLORS, MATERIALS, MEASUREMENTS, MaterialId, TABLE};
 use crate::error::Layout;
 use crate::geometry::{Angles, DirectionPair};
 use crate::{Error, Material, Measurements};
@@ -57,7 +57,7 @@ fn check_directions(directions: &[DirectionPair]) -> Result<(), Layout> {
 }
 
 fn files(channels: &[String]) -> Result<&'static [(&'static str, &'static str)], Layout> {
-    [COLOURS.as_slice(), AVERAGE.as_slice()]
+    [COLORS.as_slice(), AVERAGE.as_slice()]
         .into_iter()
         .find(|files| {
             files

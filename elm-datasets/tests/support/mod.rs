@@ -11,8 +11,8 @@ pub fn all() -> Vec<MaterialId> {
     MaterialId::all().collect()
 }
 
-/// A folder with the stand-in in CUReT's layout, removed when dropped.
-pub fn stand_in() -> tempfile::TempDir {
+/// A folder with the synthetic data in CUReT's layout, removed when dropped.
+pub fn synthetic_folder() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let set = synthetic::measurements(1, &all(), Invalid::Keep);
     curet::write(dir.path(), &set).unwrap();

@@ -124,13 +124,13 @@ pub(super) fn scores_of_tiles<A: Scalar>(
     roundoff: f64,
 ) -> Result<Array2<f64>> {
     /// Condition up to which leverages may be computed in `f32`.
-    const MODERATE: f64 = 1e3;
+    const MAX_SINGLE_PRECISION_CONDITION: f64 = 1e3;
     let mean = means(spectrum);
     let condition = match (spectrum.s.first(), spectrum.s.last()) {
         (Some(first), Some(last)) => first / last,
         _ => 1.0,
     };
-    let single = spectrum.route == Route::GramSvd && condition <= MODERATE;
+    let single = spectrum.route == Route::GramSvd && condition <= MAX_SINGLE_PRECISION_CONDITION;
     let mut pass = Pass {
         to_u: &spectrum.vt.t() / &spectrum.s,
         scores: Scores::new(spectrum, candidates, single),

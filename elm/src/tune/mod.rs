@@ -288,8 +288,8 @@ impl<A: Scalar> Tuner<A> {
     /// Where doubling ends for a problem of this many rows.
     fn most_neurons(&self, rows: usize) -> usize {
         const WORK: f64 = 4e9;
-        let affordable = || (WORK / rows as f64).sqrt().clamp(200.0, 1000.0) as usize;
-        self.max_neurons.unwrap_or_else(affordable)
+        let with_work_limit = || (WORK / rows as f64).sqrt().clamp(200.0, 1000.0) as usize;
+        self.max_neurons.unwrap_or_else(with_work_limit)
     }
 
     fn check(&self) -> Result<()> {

@@ -225,7 +225,7 @@ impl<'a, A: Scalar> Search<'a, A> {
     /// Scales inputs by the slopes that the network has along them, and again, as long as that pays.
     fn follow_slopes(&mut self) -> Result<()> {
         const ROUNDS: usize = 4;
-        let caution = self.overfitting_penalty();
+        let penalty = self.overfitting_penalty();
         for _ in 0..ROUNDS {
             let Some(now) = self.now().filter(|_| !self.is_spent()) else {
                 break;
@@ -238,7 +238,7 @@ impl<'a, A: Scalar> Search<'a, A> {
                 let scales = proportional(&slopes, power);
                 let exponent = now.scale.log10();
                 moved |= self.move_if(now.neurons, exponent, &scales, |new, old| {
-                    new.improves_on(old, 1.0 + caution)
+                    new.improves_on(old, 1.0 + penalty)
                 })?;
             }
             if !moved {
@@ -296,7 +296,7 @@ impl<'a, A: Scalar> Search<'a, A> {
 
     /// Coordinate by coordinate, the steepest first, by a factor that shrinks once no input moves.
     fn choose_input_scales(&mut self) -> Result<()> {
-        let caution = self.overfitting_penalty();
+        let penalty = self.overfitting_penalty();
         // The budget may end before the inputs do.
         let mut order: Vec<usize> = (0..self.x.ncols()).collect();
         if let Some(slopes) = &self.steepness {
@@ -315,7 +315,7 @@ impl<'a, A: Scalar> Search<'a, A> {
                     scales[input] *= 10.0_f64.powf(direction * step);
                     let exponent = now.scale.log10();
                     if self.move_if(now.neurons, exponent, &scales, |new, old| {
-                        new.improves_on(old, 2.0 + caution)
+                        new.improves_on(old, 2.0 + penalty)
                     })? {
                         moved = true;
                         break;

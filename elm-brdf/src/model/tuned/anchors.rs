@@ -33,14 +33,14 @@ const LISTED: usize = 24;
 const JUDGED: usize = 200;
 
 /// Coordinates in which near means alike; the last two turn with a surface that has a `grain`.
-fn place(pair: &DirectionPair, grain: bool) -> [f64; 5] {
+fn place(pair: &DirectionPair, anisotropic: bool) -> [f64; 5] {
     let angles = pair.half_difference();
     let root = 2.0 * angles.theta_h().sqrt();
     let (x, y) = (
         pair.incident[0] + pair.outgoing[0],
         pair.incident[1] + pair.outgoing[1],
     );
-    let turned = if grain {
+    let turned = if anisotropic {
         root / (x * x + y * y).max(f64::MIN_POSITIVE)
     } else {
         0.0
@@ -58,16 +58,16 @@ fn place(pair: &DirectionPair, grain: bool) -> [f64; 5] {
 type Near = (f64, usize);
 
 /// The measurements by their place.
-pub(super) struct Neighbourhood {
+pub(super) struct Neighborhood {
     places: Vec<[f64; 5]>,
-    grain: bool,
+    anisotropic: bool,
 }
 
-impl Neighbourhood {
-    pub(super) fn new(pairs: &[DirectionPair], grain: bool) -> Self {
+impl Neighborhood {
+    pub(super) fn new(pairs: &[DirectionPair], anisotropic: bool) -> Self {
         Self {
-            places: pairs.iter().map(|pair| place(pair, grain)).collect(),
-            grain,
+            places: pairs.iter().map(|pair| place(pair, anisotropic)).collect(),
+            anisotropic,
         }
     }
 
@@ -96,7 +96,7 @@ impl Neighbourhood {
     ) -> Array2<f64> {
         let mut guesses = Array2::zeros((pairs.len(), values.ncols()));
         for (pair, guess) in pairs.iter().zip(guesses.rows_mut()) {
-            let near = self.nearest(place(pair, self.grain), NEAREST, None);
+            let near = self.nearest(place(pair, self.anisotropic), NEAREST, None);
             mean_of(&near, values, guess);
         }
         guesses
@@ -129,16 +129,18 @@ pub(super) struct Anchors {
 }
 
 impl Anchors {
-    pub(super) fn new(neighbourhood: &Neighbourhood, seed: u64) -> Self {
+    pub(super) fn new(neighborhood: &Neighborhood, seed: u64) -> Self {
         let mut random = generator(seed, streams::ANCHORS);
-        let pairs = scatter(&mut random, neighbourhood.grain);
-        let near = pairs.iter().map(|pair| place(pair, neighbourhood.grain));
-        let near = near.map(|at| neighbourhood.nearest(at, LISTED, None));
-        let rows = neighbourhood.places.len();
+        let pairs = scatter(&mut random, neighborhood.anisotropic);
+        let near = pairs
+            .iter()
+            .map(|pair| place(pair, neighborhood.anisotropic));
+        let near = near.map(|at| neighborhood.nearest(at, LISTED, None));
+        let rows = neighborhood.places.len();
         let judged = index::sample(&mut random, rows, JUDGED.min(rows));
         let judged = judged.into_iter().map(|row| {
-            let at = neighbourhood.places[row];
-            (row, neighbourhood.nearest(at, NEAREST, Some(row)))
+            let at = neighborhood.places[row];
+            (row, neighborhood.nearest(at, NEAREST, Some(row)))
         });
         Self {
             near: near.collect(),
@@ -194,7 +196,7 @@ impl Anchors {
 /// Pairs of directions over the hemisphere: half of [`ANCHORS`] anywhere by both angles, half by the
 /// half vector, near the mirror direction; and [`GRAZING`] ones in both of whose directions near the horizon.
 /// For a surface with a grain each is turned about the normal.
-pub(super) fn scatter(random: &mut ChaCha8Rng, grain: bool) -> Vec<DirectionPair> {
+pub(super) fn scatter(random: &mut ChaCha8Rng, anisotropic: bool) -> Vec<DirectionPair> {
     let mut pairs = Vec::with_capacity(ANCHORS + GRAZING);
     while pairs.len() < ANCHORS {
         if pairs.len() % 2 == 0 {
@@ -237,7 +239,7 @@ pub(super) fn scatter(random: &mut ChaCha8Rng, grain: bool) -> Vec<DirectionPair
             outgoing: cartesian(theta_o, PI * (1.0 - part * part)),
         });
     }
-    if grain {
+    if anisotropic {
         for pair in &mut pairs {
             *pair = pair.turned(random.random_range(0.0..TAU));
         }

@@ -13,12 +13,12 @@ use elm::{Dataset, Elm, ElmParams};
 use ndarray::{Array1, Array2, Axis, Slice};
 
 use super::Drawn;
+use super::albedo_check::AlbedoCheck;
 use super::anchors::scatter;
 use super::errors::{no_fit, row_weights};
 use super::finish::{Finished, Fitted, ROUNDING, reach};
-use super::moments::{Moments, WEAKEST, Weights, rounding};
+use super::normal_equations::{NormalEquations, WEAKEST, Weights, rounding};
 use super::problem::Problem;
-use super::survey::Survey;
 use crate::error::Result;
 use crate::features::Features;
 use crate::streams::{self, generator};
@@ -59,10 +59,15 @@ impl Places {
         let judged = problem.judged_pairs.iter().copied();
         let mut pairs: Vec<DirectionPair> = judged.take(MEASURED).collect();
         let measured = pairs.len();
-        pairs.extend(scatter(&mut random, problem.grain));
+        pairs.extend(scatter(&mut random, problem.anisotropic));
         let (targets, without) = teacher.targets(&pairs);
-        let values = problem.link.to_values(targets.clone())?;
-        let weights = row_weights(problem.tuned.metric, &pairs, values.view(), &problem.link);
+        let values = problem.transform.to_values(targets.clone())?;
+        let weights = row_weights(
+            problem.tuned.metric,
+            &pairs,
+            values.view(),
+            &problem.transform,
+        );
         Ok(Self {
             x: features.compute(&pairs),
             measured,
@@ -107,23 +112,23 @@ impl Problem<'_> {
     fn like(&self, features: Features, map: &FeatureMap<f64>, places: &Places) -> Result<Fitted> {
         let h = map.transform(&places.x)?;
         let judged = map.transform(&features.compute(&self.judged_pairs))?;
-        let survey = Survey::new(self.grain);
+        let albedo = AlbedoCheck::new(self.anisotropic);
         let mut best: Option<Fitted> = None;
         let mut between = BETWEEN;
         for _ in 0..=STEPS {
             let weights = places.weighted(between);
-            let moments = Moments::of(h.view(), places.targets.view(), Some(&weights));
-            let (strength, found) = self.weights_like(map, &h, places, &weights, &moments)?;
+            let equations = NormalEquations::of(h.view(), places.targets.view(), Some(&weights));
+            let (strength, found) = self.weights_like(map, &h, places, &weights, &equations)?;
             let network = Elm::from_parts(map.clone(), found.beta, found.intercept)?;
-            let excess = survey.excess(features, &network, &self.link, |pairs| {
-                self.neighbours_guess(pairs)
+            let excess = albedo.excess(features, &network, &self.transform, |pairs| {
+                self.neighbors_guess(pairs)
             })?;
             if best.as_ref().is_none_or(|best| excess < best.excess) {
-                let factor = moments.factor(strength).ok_or_else(no_fit)?;
+                let factor = equations.factor(strength).ok_or_else(no_fit)?;
                 let mut held_out = Array2::zeros((self.judged.len(), self.targets.ncols()));
                 let mut first = 0;
                 for (fold, targets) in self.folds.iter().zip(&places.without) {
-                    let solved = factor.solve(&moments.again(&h, targets, Some(&weights)))?;
+                    let solved = factor.solve(&equations.again(&h, targets, Some(&weights)))?;
                     let range = Slice::from(first..first + fold.len());
                     let fitted = solved.apply(judged.slice_axis(Axis(0), range));
                     held_out.slice_axis_mut(Axis(0), range).assign(&fitted);
@@ -150,7 +155,7 @@ impl Problem<'_> {
         h: &Array2<f64>,
         places: &Places,
         weights: &Array1<f64>,
-        moments: &Moments,
+        equations: &NormalEquations,
     ) -> Result<(f64, Weights)> {
         let reach = reach(map.layer());
         let mut chosen: Option<(f64, f64, Weights)> = None;
@@ -159,11 +164,11 @@ impl Problem<'_> {
             if step > best_step.saturating_add(NO_GAIN) {
                 break;
             }
-            let strength = moments.scale() * WEAKEST * 10_f64.powf(step as f64 / 2.0);
-            let Some(factor) = moments.factor(strength) else {
+            let strength = equations.scale() * WEAKEST * 10_f64.powf(step as f64 / 2.0);
+            let Some(factor) = equations.factor(strength) else {
                 continue;
             };
-            let solved = factor.solve(moments)?;
+            let solved = factor.solve(equations)?;
             let squares = (solved.apply(h.view()) - &places.targets).mapv_into(|e| e * e);
             let errors = squares.t().dot(weights) / weights.sum();
             let rounded = rounding(solved.beta.view(), reach.view());

@@ -3,8 +3,8 @@
 use ndarray::{Array1, ArrayView1, ArrayView2};
 
 use crate::error::Error;
-use crate::link::FittedLink;
 use crate::metrics::Metric;
+use crate::target_transform::FittedTransform;
 use elm_datasets::geometry::DirectionPair;
 
 /// Of the errors the largest are cut off at this quantile, lest a few rows decide.
@@ -26,12 +26,12 @@ pub(super) fn row_weights(
     metric: Metric,
     pairs: &[DirectionPair],
     values: ArrayView2<'_, f64>,
-    link: &FittedLink,
+    transform: &FittedTransform,
 ) -> Option<Array1<f64>> {
     if metric != Metric::LogCosine {
         return None;
     }
-    let offsets = link.offsets();
+    let offsets = transform.offsets();
     let weights = pairs.iter().zip(values.rows()).map(|(pair, values)| {
         // At grazing every error counts little, but a row of no weight would be no row.
         let cosine = pair.outgoing[2].max(1e-3);
@@ -82,10 +82,10 @@ pub(super) fn dark_noise(fitted: ArrayView1<'_, f64>, values: ArrayView1<'_, f64
     if errors.is_empty() {
         return 0.0;
     }
-    let centre = middle(&mut errors);
+    let center = middle(&mut errors);
     errors
         .iter_mut()
-        .for_each(|error| *error = (*error - centre).abs());
+        .for_each(|error| *error = (*error - center).abs());
     // The median of a normal deviate's size is 0.6745 standard deviations.
     middle(&mut errors) / 0.6745
 }

@@ -13,12 +13,12 @@ use elm::Elm;
 use ndarray::{Array1, Array2, Axis, Slice};
 
 use super::Drawn;
+use super::albedo_check::AlbedoCheck;
 use super::censored::Censored;
 use super::errors::{cut_off_means, geometric_root, no_fit};
-use super::moments::{WEAKEST, Weights, rounding};
+use super::normal_equations::{WEAKEST, Weights, rounding};
 use super::problem::Problem;
 use super::rows::{Pull, Rows, STRENGTHS, TILE};
-use super::survey::Survey;
 use crate::error::Result;
 use crate::features::Features;
 use crate::metrics::{Metric, Metrics};
@@ -84,15 +84,15 @@ impl Problem<'_> {
         let (strength, held_out) = self.strength(&rows, &reach, None, (2..STRENGTHS).step_by(2))?;
         let at_anchors = map.transform(&features.compute(&self.anchors.pairs))?;
         let mut pull = Pull::new(self, at_anchors, &self.variances(&held_out));
-        let survey = Survey::new(self.grain);
+        let albedo = AlbedoCheck::new(self.anisotropic);
         let mut best = None;
         for _ in 0..=STEPS {
             let near = rows.near(strength);
             let (strength, held_out) = self.strength(&rows, &reach, Some(&pull), near)?;
             let weights = self.solve(&rows, map, x, strength, &pull)?;
             let network = Elm::from_parts(map.clone(), weights.beta, weights.intercept)?;
-            let excess = survey.excess(features, &network, &self.link, |pairs| {
-                self.neighbours_guess(pairs)
+            let excess = albedo.excess(features, &network, &self.transform, |pairs| {
+                self.neighbors_guess(pairs)
             })?;
             let better = |&(_, _, known): &(_, _, f64)| excess < known;
             if best.as_ref().is_none_or(better) {
@@ -118,7 +118,7 @@ impl Problem<'_> {
         if self.folds.len() < 2 {
             return Ok(None);
         }
-        let predicted = self.link.to_values(held_out.clone())?;
+        let predicted = self.transform.to_values(held_out.clone())?;
         let values = self.values.select(Axis(0), &self.judged);
         Metrics::of(&self.judged_pairs, predicted.view(), values.view()).map(Some)
     }
@@ -246,7 +246,7 @@ impl Problem<'_> {
     /// too dark, the more, the darker the rows. Where the RMSE is asked for, residuals are therefore
     /// taken of the values, $(y - f) / (f + o)$, instead of the targets, $\ln (y + o) - \ln(f + o)$,
     /// whose mean is 0 where $f$ is the mean of $y$: the estimating equations of a regression with
-    /// logarithmic link whose deviation is proportional to $f + o$ (R. Wedderburn, *Quasi-Likelihood
+    /// logarithmic transform whose deviation is proportional to $f + o$ (R. Wedderburn, *Quasi-Likelihood
     /// Functions, Generalized Linear Models, and the Gauss-Newton Method*, Biometrika 61(3), 1974),
     /// solved by the same factorisation.
     fn solve(
@@ -273,9 +273,11 @@ impl Problem<'_> {
                 let h = map.transform(&x.slice_axis(Axis(0), tile))?;
                 let fitted = weights.apply(h.view());
                 let values = self.values.slice_axis(Axis(0), tile);
-                let means = self.link.to_values(fitted.clone())?;
+                let means = self.transform.to_values(fitted.clone())?;
                 let values = censored.completed(values, means.view());
-                let working = self.link.working_targets(fitted.view(), values.view())?;
+                let working = self
+                    .transform
+                    .working_targets(fitted.view(), values.view())?;
                 moved.add_cross(&rows.total.again(&h, &working, None), 1.0);
                 z.slice_axis_mut(Axis(0), tile).assign(&working);
             }

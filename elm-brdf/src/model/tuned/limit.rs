@@ -29,7 +29,7 @@ const AS_GOOD: f64 = 2.0;
 /// First and largest step of the logarithms, and the step at which the search ends.
 const STEP: f64 = 0.4;
 const LARGEST_STEP: f64 = 1.0;
-const LEAST_STEP: f64 = 0.02;
+const MIN_STEP: f64 = 0.02;
 
 /// How smooth the limit is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -303,7 +303,7 @@ impl Rows {
                     at[k] = (at[k] + slope.signum() * steps[k]).clamp(low.ln(), high.ln());
                 }
             }
-            if steps.iter().all(|&step| step < LEAST_STEP) {
+            if steps.iter().all(|&step| step < MIN_STEP) {
                 break;
             }
         }

@@ -4,11 +4,11 @@ use ndarray::{Array1, Array2, ArrayView2, Axis};
 use rand::seq::index;
 
 use super::Tuned;
-use super::anchors::{Anchors, Neighbourhood};
+use super::anchors::{Anchors, Neighborhood};
 use super::errors::row_weights;
 use crate::error::Result;
-use crate::link::FittedLink;
 use crate::streams::{self, generator};
+use crate::target_transform::FittedTransform;
 use elm_datasets::geometry::DirectionPair;
 
 /// Folds of the cross-validation.
@@ -23,13 +23,13 @@ pub(super) struct Problem<'a> {
     pub(super) tuned: &'a Tuned,
     pub(super) pairs: &'a [DirectionPair],
     pub(super) values: ArrayView2<'a, f64>,
-    pub(super) link: FittedLink,
+    pub(super) transform: FittedTransform,
     /// Standard deviation of the noise of each channel's dark values, in 1/sr.
     pub(super) noise: Vec<f64>,
     /// Whether that is as large as values are.
     pub(super) noisy: bool,
     /// Whether the surface has a grain.
-    pub(super) grain: bool,
+    pub(super) anisotropic: bool,
     pub(super) targets: Array2<f64>,
     pub(super) weights: Option<Array1<f64>>,
     /// The rows that are left out in turn, fold by fold.
@@ -39,7 +39,7 @@ pub(super) struct Problem<'a> {
     pub(super) judged_pairs: Vec<DirectionPair>,
     /// The measurements that guesses are made from, as places among the judged.
     pub(super) known: Vec<usize>,
-    pub(super) neighbourhood: Neighbourhood,
+    pub(super) neighborhood: Neighborhood,
     pub(super) anchors: Anchors,
 }
 
@@ -48,10 +48,10 @@ impl<'a> Problem<'a> {
         tuned: &'a Tuned,
         pairs: &'a [DirectionPair],
         values: ArrayView2<'a, f64>,
-        link: FittedLink,
+        transform: FittedTransform,
         noise: Vec<f64>,
         noisy: bool,
-        grain: bool,
+        anisotropic: bool,
     ) -> Result<Self> {
         let mut random = generator(tuned.seed, streams::JUDGED);
         let rows = pairs.len();
@@ -67,23 +67,23 @@ impl<'a> Problem<'a> {
             .collect();
         let known_pairs: Vec<DirectionPair> =
             known.iter().map(|&place| judged_pairs[place]).collect();
-        let neighbourhood = Neighbourhood::new(&known_pairs, grain);
+        let neighborhood = Neighborhood::new(&known_pairs, anisotropic);
         Ok(Self {
-            targets: link.to_targets(values)?,
-            weights: row_weights(tuned.metric, pairs, values, &link),
-            anchors: Anchors::new(&neighbourhood, tuned.seed),
+            targets: transform.to_targets(values)?,
+            weights: row_weights(tuned.metric, pairs, values, &transform),
+            anchors: Anchors::new(&neighborhood, tuned.seed),
             tuned,
             pairs,
             values,
-            link,
+            transform,
             noise,
             noisy,
-            grain,
+            anisotropic,
             folds,
             judged,
             judged_pairs,
             known,
-            neighbourhood,
+            neighborhood,
         })
     }
 
@@ -114,9 +114,9 @@ impl<'a> Problem<'a> {
     }
 
     /// What the nearest measurements say of the targets at any pairs.
-    pub(super) fn neighbours_guess(&self, pairs: &[DirectionPair]) -> Array2<f64> {
+    pub(super) fn neighbors_guess(&self, pairs: &[DirectionPair]) -> Array2<f64> {
         let targets = self.targets(&self.known_rows());
-        self.neighbourhood.guess(pairs, targets.view())
+        self.neighborhood.guess(pairs, targets.view())
     }
 
     /// What anchors count where the targets have these variances about a network.

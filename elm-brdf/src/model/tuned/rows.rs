@@ -4,7 +4,7 @@ use elm::advanced::FeatureMap;
 use ndarray::{Array1, Array2, ArrayView2, Axis, Slice};
 
 use super::errors::no_fit;
-use super::moments::{Moments, WEAKEST};
+use super::normal_equations::{NormalEquations, WEAKEST};
 use super::problem::Problem;
 use crate::error::Result;
 
@@ -17,10 +17,10 @@ pub(super) const ANCHORED: f64 = 1e-3;
 
 /// A layer at the rows.
 pub(super) struct Rows {
-    pub(super) total: Moments,
+    pub(super) total: NormalEquations,
     /// What strengths are relative to.
     pub(super) scale: f64,
-    pub(super) folds: Vec<Moments>,
+    pub(super) folds: Vec<NormalEquations>,
     /// The hidden-layer matrix of the judged rows.
     pub(super) judged: Array2<f64>,
 }
@@ -33,13 +33,13 @@ impl Rows {
     ) -> Result<Self> {
         let judged = map.transform(&x.select(Axis(0), problem.judged()))?;
         let of = |h: ArrayView2<'_, f64>, rows: &[usize]| {
-            Moments::of(
+            NormalEquations::of(
                 h,
                 problem.targets(rows).view(),
                 problem.weights(rows).as_ref(),
             )
         };
-        let mut folds: Vec<Moments> = Vec::new();
+        let mut folds: Vec<NormalEquations> = Vec::new();
         let mut first = 0;
         for fold in problem.folds() {
             let range = Slice::from(first..first + fold.len());
@@ -79,8 +79,8 @@ pub(super) struct Pull {
     pub(super) h: Array2<f64>,
     pub(super) weights: Array1<f64>,
     /// Without the measurements of each fold, and with all.
-    pub(super) without: Vec<Moments>,
-    pub(super) all: Moments,
+    pub(super) without: Vec<NormalEquations>,
+    pub(super) all: NormalEquations,
     /// So many times their weight.
     pub(super) times: f64,
 }
@@ -90,7 +90,7 @@ impl Pull {
     pub(super) fn new(problem: &Problem<'_>, h: Array2<f64>, variances: &[f64]) -> Self {
         let weights = problem.anchor_weights(variances);
         let guesses = problem.guesses_of_targets(|_| true);
-        let all = Moments::of(h.view(), guesses.view(), Some(&weights));
+        let all = NormalEquations::of(h.view(), guesses.view(), Some(&weights));
         let mut first = 0;
         let without = problem.folds().iter().map(|fold| {
             let range = first..first + fold.len();

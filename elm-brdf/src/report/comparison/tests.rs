@@ -21,14 +21,14 @@ fn comparison() -> Comparison {
         };
         Entry::new(words, &data.channels, false, &[scores])
     });
-    let data = Data::of("stand-in".to_owned(), &data, &first);
+    let data = Data::of("synthetic".to_owned(), &data, &first);
     Comparison::new(data, 5, 1, 1, entries.to_vec(), 0.5)
 }
 
 #[test]
 fn the_model_with_the_smaller_error_comes_first_in_every_form() {
     let comparison = comparison();
-    // The stand-in has highlights, which a constant misses.
+    // The synthetic data has highlights, which a constant misses.
     assert_eq!(comparison.models[0].model, "ggx+oren-nayar");
     for format in Format::ALL {
         let text = comparison.render(format).unwrap();
@@ -63,7 +63,7 @@ fn json_is_read_back() {
 }
 
 #[test]
-fn the_stand_in_is_never_compared_with_the_paper() {
+fn the_synthetic_data_is_never_compared_with_the_paper() {
     let comparison = comparison();
     assert!(
         comparison

@@ -3,7 +3,7 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::{BLUE, Chart, Drawn, GREEN, GREY, PALE, PredictionPlot, VERMILION, titled};
+use super::{BLUE, Chart, Drawn, GRAY, GREEN, PALE, PredictionPlot, VERMILION, titled};
 use elm_datasets::geometry::DirectionPair;
 
 /// Width of a bin in degrees.
@@ -96,27 +96,26 @@ impl Chart for ByAngle {
             .label_style(("sans-serif", 13))
             .axis_desc_style(("sans-serif", 15))
             .draw()?;
-        for (index, ((name, colour), points)) in ANGLES.iter().zip(&self.curves).enumerate() {
-            let colour = *colour;
+        for (index, ((name, color), points)) in ANGLES.iter().zip(&self.curves).enumerate() {
+            let color = *color;
             chart.draw_series(LineSeries::new(
                 points.iter().copied(),
-                colour.stroke_width(2),
+                color.stroke_width(2),
             ))?;
             // A shape for each, for whoever cannot tell the colours.
             let marks = points.iter();
             let label = move |(x, y): (i32, i32)| {
-                PathElement::new([(x, y), (x + 24, y)], colour.stroke_width(2))
+                PathElement::new([(x, y), (x + 24, y)], color.stroke_width(2))
             };
             match index {
                 0 => {
-                    chart.draw_series(marks.map(|&point| Circle::new(point, 5, colour.filled())))?
+                    chart.draw_series(marks.map(|&point| Circle::new(point, 5, color.filled())))?
                 }
                 1 => chart.draw_series(
-                    marks.map(|&point| TriangleMarker::new(point, 7, colour.filled())),
+                    marks.map(|&point| TriangleMarker::new(point, 7, color.filled())),
                 )?,
-                _ => chart.draw_series(
-                    marks.map(|&point| Cross::new(point, 6, colour.stroke_width(2))),
-                )?,
+                _ => chart
+                    .draw_series(marks.map(|&point| Cross::new(point, 6, color.stroke_width(2))))?,
             }
             .label(format!(
                 "{} {name}",
@@ -127,9 +126,9 @@ impl Chart for ByAngle {
         if let Some(floor) = self.noise_floor {
             let line = [(0.0, floor), (90.0, floor)];
             chart
-                .draw_series(DashedLineSeries::new(line, 6, 5, GREY.stroke_width(2)))?
+                .draw_series(DashedLineSeries::new(line, 6, 5, GRAY.stroke_width(2)))?
                 .label("noise floor from reciprocal pairs, root mean square")
-                .legend(|(x, y)| PathElement::new([(x, y), (x + 24, y)], GREY.stroke_width(2)));
+                .legend(|(x, y)| PathElement::new([(x, y), (x + 24, y)], GRAY.stroke_width(2)));
         }
         chart
             .configure_series_labels()

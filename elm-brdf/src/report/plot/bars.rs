@@ -64,7 +64,7 @@ impl Chart for Bars {
             LEFT + (share * f64::from(width - LEFT - RIGHT)) as i32
         };
         let text = ("sans-serif", 13).into_text_style(&area);
-        let centred = text.pos(Pos::new(HPos::Center, VPos::Top));
+        let centered = text.pos(Pos::new(HPos::Center, VPos::Top));
         let step = round_step(most);
         for tick in (0..=10)
             .map(|tick| f64::from(tick) * step)
@@ -73,7 +73,7 @@ impl Chart for Bars {
             let x = place(tick);
             area.draw(&PathElement::new([(x, TOP), (x, bottom)], PALE))?;
             let decimals = (-step.log10().floor()).max(0.0) as usize;
-            area.draw_text(&format!("{tick:.decimals$}"), &centred, (x, bottom + 6))?;
+            area.draw_text(&format!("{tick:.decimals$}"), &centered, (x, bottom + 6))?;
         }
         let middle = (LEFT + width - RIGHT) / 2;
         let label = ("sans-serif", 15).into_text_style(&area);
@@ -89,10 +89,10 @@ impl Chart for Bars {
         for (index, row) in self.rows.iter().enumerate() {
             let y = TOP + index as i32 * ROW as i32;
             area.draw_text(&row.name, &names, (LEFT - 8, y + 13))?;
-            let bar = |value: f64, top: i32, bottom: i32, colour: RGBColor| {
+            let bar = |value: f64, top: i32, bottom: i32, color: RGBColor| {
                 Rectangle::new(
                     [(LEFT, y + top), (place(value), y + bottom)],
-                    colour.filled(),
+                    color.filled(),
                 )
             };
             area.draw(&bar(row.rmse, 4, 14, BLUE))?;
@@ -121,11 +121,11 @@ impl Bars {
         let text = ("sans-serif", 13).into_text_style(area);
         let text = text.pos(Pos::new(HPos::Left, VPos::Center));
         let mut x = LEFT;
-        let mut say = |label: &str, colour: Option<RGBColor>| -> Drawn<DB> {
-            match colour {
-                Some(colour) => {
+        let mut say = |label: &str, color: Option<RGBColor>| -> Drawn<DB> {
+            match color {
+                Some(color) => {
                     let square = [(x, 8), (x + 14, 20)];
-                    area.draw(&Rectangle::new(square, colour.filled()))?;
+                    area.draw(&Rectangle::new(square, color.filled()))?;
                 }
                 None => {
                     let line = [(x + 7, 4), (x + 7, 24)];

@@ -3,7 +3,7 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::{BLUE, Chart, Drawn, GREY, ORANGE, PALE, VERMILION, titled};
+use super::{BLUE, Chart, Drawn, GRAY, ORANGE, PALE, VERMILION, titled};
 use crate::pareto::CostPoint;
 
 pub(super) struct Front {
@@ -33,7 +33,7 @@ impl Kind {
         }
     }
 
-    fn colour(self) -> RGBColor {
+    fn color(self) -> RGBColor {
         match self {
             Self::Network => BLUE,
             Self::Published => VERMILION,
@@ -143,21 +143,20 @@ impl Chart for Front {
             steps.push((times.1, *error));
         }
         chart
-            .draw_series(LineSeries::new(steps, GREY.stroke_width(2)))?
+            .draw_series(LineSeries::new(steps, GRAY.stroke_width(2)))?
             .label("Pareto front")
-            .legend(|(x, y)| PathElement::new([(x, y), (x + 24, y)], GREY.stroke_width(2)));
+            .legend(|(x, y)| PathElement::new([(x, y), (x + 24, y)], GRAY.stroke_width(2)));
         for kind in [Kind::Other, Kind::Network, Kind::Published] {
             let own = self.points.iter().filter(|point| point.2 == kind);
             let size = if kind == Kind::Published { 6 } else { 4 };
             let dots = own.map(|&(x, y, _)| {
-                EmptyElement::at((x, y))
-                    + Circle::new((0, 0), size, kind.colour().mix(0.7).filled())
+                EmptyElement::at((x, y)) + Circle::new((0, 0), size, kind.color().mix(0.7).filled())
             });
             let series = chart.draw_series(dots)?;
             if self.points.iter().any(|point| point.2 == kind) {
                 series
                     .label(kind.name())
-                    .legend(move |(x, y)| Circle::new((x + 12, y), 4, kind.colour().filled()));
+                    .legend(move |(x, y)| Circle::new((x + 12, y), 4, kind.color().filled()));
             }
         }
         let small = ("sans-serif", 12).into_text_style(&area);

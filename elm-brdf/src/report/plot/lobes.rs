@@ -6,7 +6,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::{BLUE, Chart, Drawn, GREEN, GREY, PALE, Panel, VERMILION, round_step, titled};
+use super::{BLUE, Chart, Drawn, GRAY, GREEN, PALE, Panel, VERMILION, round_step, titled};
 use crate::error::Result;
 use elm_datasets::geometry::{DirectionPair, cartesian};
 
@@ -121,10 +121,10 @@ impl Chart for Lobes {
         let text = ("sans-serif", 13).into_text_style(&area);
         let text = text.pos(Pos::new(HPos::Left, VPos::Center));
         let mut x = 14;
-        for (light, colour) in LIGHTS {
+        for (light, color) in LIGHTS {
             area.draw(&PathElement::new(
                 [(x, 12), (x + 24, 12)],
-                colour.stroke_width(2),
+                color.stroke_width(2),
             ))?;
             area.draw_text(&format!("light at {light} degrees"), &text, (x + 30, 12))?;
             x += 190;
@@ -159,8 +159,8 @@ impl Drawing {
                 ground - (y / most * radius) as i32,
             )
         };
-        let small = ("sans-serif", 11).into_text_style(area).color(&GREY);
-        let centred = small.pos(Pos::new(HPos::Center, VPos::Top));
+        let small = ("sans-serif", 11).into_text_style(area).color(&GRAY);
+        let centered = small.pos(Pos::new(HPos::Center, VPos::Top));
         let arc = |r: f64| {
             (0..=60)
                 .map(move |s| PI * f64::from(s) / 60.0)
@@ -175,7 +175,7 @@ impl Drawing {
             area.draw(&PathElement::new(line, PALE))?;
             let decimals = (-step.log10().floor()).max(0.0) as usize;
             let (x, y) = pixel((ring, 0.0));
-            area.draw_text(&format!("{ring:.decimals$}"), &centred, (x, y + 4))?;
+            area.draw_text(&format!("{ring:.decimals$}"), &centered, (x, y + 4))?;
         }
         for degrees in [-60, -30, 0, 30, 60] {
             let angle = f64::from(degrees).to_radians();
@@ -187,20 +187,20 @@ impl Drawing {
         }
         area.draw(&PathElement::new(
             [pixel((-most, 0.0)), pixel((most, 0.0))],
-            GREY,
+            GRAY,
         ))?;
-        for ((curve, points), (light, colour)) in self.lobes.iter().zip(LIGHTS) {
+        for ((curve, points), (light, color)) in self.lobes.iter().zip(LIGHTS) {
             let line: Vec<_> = curve.iter().copied().map(pixel).collect();
-            area.draw(&PathElement::new(line, colour.stroke_width(2)))?;
+            area.draw(&PathElement::new(line, color.stroke_width(2)))?;
             for &point in points {
-                area.draw(&Circle::new(pixel(point), 4, colour.filled()))?;
+                area.draw(&Circle::new(pixel(point), 4, color.filled()))?;
             }
             // Where the light stands.
             let angle = light.to_radians();
             let ray = |r: f64| pixel((-r * most * angle.sin(), r * most * angle.cos()));
             area.draw(&PathElement::new(
                 [ray(0.9), ray(1.0)],
-                colour.stroke_width(4),
+                color.stroke_width(4),
             ))?;
         }
         area.draw_text(

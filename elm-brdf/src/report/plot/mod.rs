@@ -30,12 +30,13 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
 
-use super::{mean, paper};
+use super::paper;
 use crate::error::{Error, Result};
 use crate::file;
 use crate::fit::Fit;
 use crate::pareto::CostPoint;
 use crate::protocol::MaterialScores;
+use crate::statistics::mean;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::DirectionPair;
 
@@ -43,7 +44,7 @@ pub(super) const BLUE: RGBColor = RGBColor(0, 114, 178);
 pub(super) const ORANGE: RGBColor = RGBColor(230, 159, 0);
 pub(super) const GREEN: RGBColor = RGBColor(0, 158, 115);
 pub(super) const VERMILION: RGBColor = RGBColor(213, 94, 0);
-pub(super) const GREY: RGBColor = RGBColor(120, 120, 120);
+pub(super) const GRAY: RGBColor = RGBColor(120, 120, 120);
 pub(super) const PALE: RGBColor = RGBColor(222, 222, 222);
 
 /// A picture of lobes has no more panels than the paper has materials.
@@ -287,7 +288,7 @@ fn titled<DB: DrawingBackend>(
     title: &str,
 ) -> Result<DrawingArea<DB, Shift>, DrawingAreaErrorKind<DB::ErrorType>> {
     area.draw_text(what, &("sans-serif", 20).into_text_style(area), (14, 10))?;
-    let small = ("sans-serif", 13).into_text_style(area).color(&GREY);
+    let small = ("sans-serif", 13).into_text_style(area).color(&GRAY);
     area.draw_text(title, &small, (14, 36))?;
     Ok(area.margin(60, 0, 0, 0))
 }
@@ -337,8 +338,8 @@ mod tests {
             measured: values.view(),
         };
         let dir = tempfile::tempdir().unwrap();
-        let mut files = write(dir.path(), "stand-in, ggx", &shown).unwrap();
-        files.extend(write_lobes(dir.path(), "stand-in, ggx", &[panel]).unwrap());
+        let mut files = write(dir.path(), "synthetic, ggx", &shown).unwrap();
+        files.extend(write_lobes(dir.path(), "synthetic, ggx", &[panel]).unwrap());
         assert_eq!(files.len(), 8);
         for file in &files {
             let bytes = std::fs::read(file).unwrap();
@@ -354,13 +355,13 @@ mod tests {
             } else {
                 let text = String::from_utf8(bytes).unwrap();
                 assert!(
-                    text.starts_with("<svg") && text.contains("stand-in, ggx"),
+                    text.starts_with("<svg") && text.contains("synthetic, ggx"),
                     "{text}"
                 );
             }
         }
         let before = std::fs::read(&files[0]).unwrap();
-        write(dir.path(), "stand-in, ggx", &shown).unwrap();
+        write(dir.path(), "synthetic, ggx", &shown).unwrap();
         assert_eq!(before, std::fs::read(&files[0]).unwrap());
     }
 

@@ -16,9 +16,9 @@ use super::problem::Problem;
 use super::{Drawn, Tuned, better};
 use crate::error::{Error, Result};
 use crate::features::Features;
-use crate::link::FittedLink;
 use crate::metrics::Metric;
 use crate::streams::{self, generator};
+use crate::target_transform::FittedTransform;
 use elm_datasets::geometry::DirectionPair;
 
 /// Most neurons, unless they are asked for, and how many are drawn for each that is kept.
@@ -31,7 +31,7 @@ const SECOND: (usize, usize) = (240, 14);
 const CLOSE: f64 = 0.3;
 /// Inputs that turn with the surface must have an evidence higher by this for each value: a grain is plain to
 /// see, or none.
-const GRAIN: f64 = 0.3;
+const ANISOTROPY_GAIN: f64 = 0.3;
 /// Rows that the limit is fitted to, at most: it costs their cube.
 const LIMIT_ROWS: usize = 600;
 /// Folds for the noise.
@@ -61,16 +61,16 @@ impl<'a> Search<'a> {
         tuned: &'a Tuned,
         pairs: &[DirectionPair],
         values: ArrayView2<'_, f64>,
-        link: &FittedLink,
+        transform: &FittedTransform,
         grain: Option<Features>,
     ) -> Result<Self> {
-        let targets = link.to_targets(values)?;
+        let targets = transform.to_targets(values)?;
         let mut random = generator(tuned.seed, streams::FEW);
         let drawn = index::sample(&mut random, pairs.len(), pairs.len()).into_vec();
         let mut rows = evenly(&drawn, &targets);
         rows.truncate(LIMIT_ROWS);
         let targets = targets.select(Axis(0), &rows);
-        let weights = row_weights(tuned.metric, pairs, values, link);
+        let weights = row_weights(tuned.metric, pairs, values, transform);
         let spread = weights.map_or_else(
             || Array1::ones(rows.len()),
             |weights| {
@@ -86,7 +86,7 @@ impl<'a> Search<'a> {
                 let x = features.compute_training(pairs);
                 let scaler = Scaler::measured(&x)?;
                 let rows = Rows {
-                    x: standardised(&scaler, &x.select(Axis(0), &rows)),
+                    x: standardized(&scaler, &x.select(Axis(0), &rows)),
                     targets: targets.clone(),
                     spread: spread.clone(),
                 };
@@ -114,14 +114,14 @@ impl<'a> Search<'a> {
     }
 
     /// Whether the best set's inputs turn with the surface.
-    pub(super) fn has_grain(&self) -> bool {
+    pub(super) fn is_anisotropic(&self) -> bool {
         let best = self.found.first();
         best.is_some_and(|best| !best.features.is_isotropic())
     }
 
     /// The standard deviation of the noise of each channel's dark half, in 1/sr: of what the best
     /// set is off by at rows left out, by the median, which a few bad rows do not move.
-    pub(super) fn noise(&self, link: &FittedLink) -> Result<Vec<f64>> {
+    pub(super) fn noise(&self, transform: &FittedTransform) -> Result<Vec<f64>> {
         let count = self.rows.len();
         let channels = self.values.ncols();
         let Some(best) = self.found.first().filter(|_| count >= 4 * FOLDS) else {
@@ -137,7 +137,7 @@ impl<'a> Search<'a> {
                 held_out.row_mut(row).assign(&without.row(row));
             }
         }
-        let held_out = link.to_values(held_out)?;
+        let held_out = transform.to_values(held_out)?;
         let columns = held_out.columns().into_iter().zip(self.values.columns());
         Ok(columns
             .map(|(fitted, values)| dark_noise(fitted, values))
@@ -203,9 +203,11 @@ impl<'a> Search<'a> {
         let mut censored = Censored::new(self.values.view(), &problem.noise);
         for _ in 0..censored.rounds() {
             let fitted = limit.fitted();
-            let means = problem.link.to_values(fitted.clone())?;
+            let means = problem.transform.to_values(fitted.clone())?;
             let values = censored.completed(self.values.view(), means.view());
-            let working = problem.link.working_targets(fitted.view(), values.view())?;
+            let working = problem
+                .transform
+                .working_targets(fitted.view(), values.view())?;
             limit.fit(&working);
             censored.learn();
         }
@@ -235,7 +237,7 @@ impl Found {
         if self.features.is_isotropic() {
             self.setting.evidence
         } else {
-            self.setting.evidence - GRAIN * values
+            self.setting.evidence - ANISOTROPY_GAIN * values
         }
     }
 
@@ -254,7 +256,7 @@ struct Large<'a> {
 impl Teacher for Large<'_> {
     fn targets(&self, pairs: &[DirectionPair]) -> (Array2<f64>, Vec<Array2<f64>>) {
         let x = self.found.features.compute(pairs);
-        self.limit.predict(&standardised(&self.found.scaler, &x))
+        self.limit.predict(&standardized(&self.found.scaler, &x))
     }
 }
 
@@ -267,7 +269,7 @@ fn sort(found: &mut [Found], values: f64) {
     found.sort_by(|a, b| b.rank(values).total_cmp(&a.rank(values)));
 }
 
-fn standardised(scaler: &Scaler<f64>, x: &Array2<f64>) -> Array2<f64> {
+fn standardized(scaler: &Scaler<f64>, x: &Array2<f64>) -> Array2<f64> {
     (x - &scaler.mean()) * scaler.factor()
 }
 

@@ -78,7 +78,7 @@ struct Terms {
 
 impl Terms {
     fn of(pairs: &[DirectionPair]) -> Self {
-        let x = Features::Grain { degrees: 0 }.compute(pairs);
+        let x = Features::Anisotropic { degrees: 0 }.compute(pairs);
         let inputs = Features::Highlight.inputs().len();
         let scaled = |input: usize| {
             let column = x.column(input);
@@ -139,7 +139,7 @@ impl Terms {
         // double.
         let azimuth = (product.atan2(same) / 4.0).rem_euclid(FRAC_PI_2);
         let degrees = (azimuth / PI * 180.0).round() as u8 % 90;
-        Ok(Features::Grain { degrees })
+        Ok(Features::Anisotropic { degrees })
     }
 }
 
@@ -195,7 +195,7 @@ mod tests {
                 };
                 let targets = Array2::from_shape_fn((rows, 1), |(row, _)| value(&pairs[row]));
                 let found = detect(&pairs, targets.view()).unwrap();
-                let Some(Features::Grain { degrees }) = found else {
+                let Some(Features::Anisotropic { degrees }) = found else {
                     panic!("{rows} rows, {turn}: {found:?}");
                 };
                 // Along and across are a quarter of a turn apart.

@@ -8,12 +8,12 @@ use ndarray::Array2;
 use crate::albedo::{self, Node};
 use crate::error::Result;
 use crate::features::Features;
-use crate::link::FittedLink;
+use crate::target_transform::FittedTransform;
 use elm_datasets::geometry::DirectionPair;
 
 /// Angles of the light in degrees at which the albedo must be physical besides the stated ones.
 const FURTHER_ANGLES: [f64; 3] = [80.0, 88.0, 89.5];
-/// Beyond this angle, where hardly anything is measured and little is seen, half more is borne.
+/// Beyond this angle, where hardly anything is measured and little is seen, half more is allowed.
 const GRAZING: f64 = 86.0;
 const GRAZING_ALLOWED: f64 = 1.5;
 
@@ -26,22 +26,26 @@ const SEEN: f64 = 1.03;
 const ALLOWED: f64 = 1.05;
 
 /// Where the albedo is looked at.
-pub(super) struct Survey {
-    /// For each angle of the light the albedo that is borne, and its nodes.
+pub(super) struct AlbedoCheck {
+    /// For each angle of the light the albedo that is allowed, and its nodes.
     angles: Vec<(f64, Vec<Node>)>,
 }
 
-impl Survey {
+impl AlbedoCheck {
     /// For a surface with a `grain` the light comes along and across it, where both halves of the viewers
     /// see the same.
-    pub(super) fn new(grain: bool) -> Self {
-        let turns: &[f64] = if grain { &[0.0, FRAC_PI_2] } else { &[0.0] };
+    pub(super) fn new(anisotropic: bool) -> Self {
+        let turns: &[f64] = if anisotropic {
+            &[0.0, FRAC_PI_2]
+        } else {
+            &[0.0]
+        };
         let angles = albedo::ANGLES.into_iter().chain(FURTHER_ANGLES);
         Self {
             angles: angles
                 .flat_map(|angle| turns.iter().map(move |&turn| (angle, turn)))
                 .map(|(angle, turn)| {
-                    let borne = if angle > GRAZING {
+                    let allowed = if angle > GRAZING {
                         GRAZING_ALLOWED
                     } else {
                         1.0
@@ -50,7 +54,7 @@ impl Survey {
                     for node in &mut nodes {
                         node.pair = node.pair.turned(turn);
                     }
-                    (borne, nodes)
+                    (allowed, nodes)
                 })
                 .collect(),
         }
@@ -62,7 +66,7 @@ impl Survey {
         &self,
         features: Features,
         network: &Elm<f64>,
-        link: &FittedLink,
+        transform: &FittedTransform,
         nearest: impl Fn(&[DirectionPair]) -> Array2<f64>,
     ) -> Result<f64> {
         let mut excess = 0.0_f64;
@@ -71,7 +75,7 @@ impl Survey {
         } else {
             &[false, true]
         };
-        for (borne, nodes) in &self.angles {
+        for (allowed, nodes) in &self.angles {
             for &swapped in orders {
                 let of = |node: &Node| {
                     if swapped {
@@ -83,16 +87,16 @@ impl Survey {
                 let turned = |node: &Node| of(node).turned(features.azimuth());
                 let pairs: Vec<DirectionPair> = nodes.iter().map(turned).collect();
                 let sums = |targets: Array2<f64>| -> Result<Vec<f64>> {
-                    Ok(albedo::sums(nodes, link.to_values(targets)?.view()))
+                    Ok(albedo::sums(nodes, transform.to_values(targets)?.view()))
                 };
-                let borne = if swapped { borne.max(SEEN) } else { *borne };
+                let allowed = if swapped { allowed.max(SEEN) } else { *allowed };
                 let found = sums(network.predict(&features.compute(&pairs))?)?;
-                if found.iter().all(|&albedo| albedo <= borne) {
+                if found.iter().all(|&albedo| albedo <= allowed) {
                     continue;
                 }
                 let implied = sums(nearest(&pairs))?;
                 for (found, implied) in found.into_iter().zip(implied) {
-                    excess = excess.max(found - (ALLOWED * implied).max(borne));
+                    excess = excess.max(found - (ALLOWED * implied).max(allowed));
                 }
             }
         }

@@ -7,15 +7,15 @@ use ndarray::{Array2, ArrayView2, Axis};
 use rand::seq::index;
 
 use super::errors::row_weights;
-use super::many::RIDGE;
+use super::large_data::RIDGE;
 use super::{Drawn, dataset, provenance};
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::fit::{Fit, check};
-use crate::link::{FittedLink, Link};
 use crate::metrics::{Metric, Metrics};
 use crate::model::{BrdfModel, Layer};
 use crate::streams::{self, generator};
+use crate::target_transform::{FittedTransform, TargetTransform};
 use elm_datasets::geometry::DirectionPair;
 
 /// A network of so many neurons of one function, made for cheap [evaluation](crate::batch).
@@ -38,18 +38,18 @@ use elm_datasets::geometry::DirectionPair;
 /// few (up to 1500).
 ///
 /// ```
-/// use elm_brdf::{batch::Packed, model::Lean};
+/// use elm_brdf::{batch::Packed, model::Compact};
 /// use elm_datasets::{Invalid, MaterialId, synthetic};
 ///
 /// let data = synthetic::measurements(1, &[MaterialId::new(39)?], Invalid::Clamp);
 /// let samples = data.samples(0).ok_or("no such material")?;
-/// let model = Lean::new(16).fit_model(&samples.directions, samples.values.view())?;
+/// let model = Compact::new(16).fit_model(&samples.directions, samples.values.view())?;
 /// let packed: Packed<f32> = Packed::new(&model)?;
 /// assert_eq!(packed.neurons(), 16);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct Lean {
+pub struct Compact {
     /// Size of the network.
     pub neurons: usize,
     /// The inputs.
@@ -66,16 +66,16 @@ pub struct Lean {
 
 /// Rows that the search fits to, and as many others that judge, at most.
 const ROWS: usize = 1500;
-/// Neurons drawn for each one kept, up to [`MOST_DRAWN`].
+/// Neurons drawn for each one kept, up to [`MAX_DRAWN`].
 const DRAWN: usize = 8;
-const MOST_DRAWN: usize = 256;
+const MAX_DRAWN: usize = 256;
 /// Scales of weights, and deviations of biases.
 const SCALES: [f64; 3] = [0.5, 1.0, 2.0];
 const BIASES: [f64; 2] = [0.9, 1.8];
 /// An input's scale is moved by these factors in turn.
 const STEPS: [f64; 3] = [2.0, 1.414, 1.2];
 
-impl Lean {
+impl Compact {
     /// So many neurons, and the defaults.
     #[must_use]
     pub fn new(neurons: usize) -> Self {
@@ -99,8 +99,8 @@ impl Lean {
         values: ArrayView2<'_, f64>,
     ) -> Result<BrdfModel> {
         check(pairs, values)?;
-        let link = Link::default_log().fit(values)?;
-        let targets = link.to_targets(values)?;
+        let transform = TargetTransform::default_log().fit(values)?;
+        let targets = transform.to_targets(values)?;
         let x = self.features.compute_training(pairs);
         let scaler = Scaler::measured(&x)?;
         let mut random = generator(self.seed, streams::COMPACT);
@@ -112,7 +112,7 @@ impl Lean {
         let search = Search {
             lean: self,
             scaler: &scaler,
-            link: &link,
+            transform: &transform,
             ridge: ridge(pairs.len()),
             x: x.select(Axis(0), fitted),
             targets: targets.select(Axis(0), fitted),
@@ -120,7 +120,7 @@ impl Lean {
                 self.metric,
                 &select(pairs, fitted),
                 values.select(Axis(0), fitted).view(),
-                &link,
+                &transform,
             ),
         };
         let judged = if judged.is_empty() { fitted } else { judged };
@@ -159,17 +159,17 @@ impl Lean {
         let Found {
             drawn, held_out, ..
         } = best;
-        let weights = row_weights(self.metric, pairs, values, &link);
+        let weights = row_weights(self.metric, pairs, values, &transform);
         let data = dataset(&x, &targets, weights.as_ref())?;
         let network = search.solve().fit_map(drawn.map, &data)?;
         let mut about = provenance(self.seed, self.metric, pairs, values);
         about.held_out = Some(held_out);
         let layer = Layer::Drawn(vec![drawn.draw]);
-        Ok(BrdfModel::new(self.features, link, layer, network).with_provenance(about))
+        Ok(BrdfModel::new(self.features, transform, layer, network).with_provenance(about))
     }
 }
 
-impl Fit for Lean {
+impl Fit for Compact {
     type Model = BrdfModel;
 
     fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
@@ -201,9 +201,9 @@ struct Found {
 }
 
 struct Search<'a> {
-    lean: &'a Lean,
+    lean: &'a Compact,
     scaler: &'a Scaler<f64>,
-    link: &'a FittedLink,
+    transform: &'a FittedTransform,
     ridge: Ridge,
     x: Array2<f64>,
     targets: Array2<f64>,
@@ -226,7 +226,7 @@ impl Search<'_> {
     fn try_scales(&self, scales: Vec<f64>, bias: f64, judge: &Judge) -> Result<Found> {
         let neurons = self.lean.neurons;
         let count = if self.lean.pruned {
-            neurons.max((DRAWN * neurons).min(MOST_DRAWN.max(neurons + neurons / 2)))
+            neurons.max((DRAWN * neurons).min(MAX_DRAWN.max(neurons + neurons / 2)))
         } else {
             neurons
         };
@@ -247,7 +247,7 @@ impl Search<'_> {
         }
         let map = drawn.map.clone();
         let network = params.fit_map(map, &data)?;
-        let predicted = self.link.to_values(network.predict(&judge.x)?)?;
+        let predicted = self.transform.to_values(network.predict(&judge.x)?)?;
         let held_out = Metrics::of(&judge.pairs, predicted.view(), judge.values.view())?;
         Ok(Found {
             scales,

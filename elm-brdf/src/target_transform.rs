@@ -7,17 +7,17 @@
 //! CUReT with a Gaussian process of the log, held out: multiplying by Duan's smearing factor, JASA
 //! 78(383), 1983, or by $e^{s^2/2}$ changes the RMSE by 0.5 % at most.)
 //!
-//! A [`Link`] is a setting. Fitted to the values of a training set it becomes a [`FittedLink`],
-//! which knows the scale of each channel and belongs to the model.
+//! A [`TargetTransform`] is a setting. Fitted to the values of a training set it becomes a
+//! [`FittedTransform`], which knows the scale of each channel and belongs to the model.
 //!
 //! ```
-//! use elm_brdf::link::Link;
+//! use elm_brdf::target_transform::TargetTransform;
 //! use ndarray::array;
 //!
 //! let values = array![[0.0], [0.2], [40.0]];
-//! let link = Link::default_log().fit(values.view())?;
-//! let targets = link.to_targets(values.view())?;
-//! let back = link.to_values(targets)?;
+//! let transform = TargetTransform::default_log().fit(values.view())?;
+//! let targets = transform.to_targets(values.view())?;
+//! let back = transform.to_values(targets)?;
 //! assert!((&back - &values).iter().all(|error| error.abs() < 1e-12));
 //! # Ok::<(), elm_brdf::Error>(())
 //! ```
@@ -34,7 +34,7 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
-pub enum Link {
+pub enum TargetTransform {
     /// The value itself, as in the paper; predictions may be negative.
     #[default]
     Identity,
@@ -49,22 +49,22 @@ pub enum Link {
     CubeRoot,
 }
 
-impl Link {
+impl TargetTransform {
     /// The names that [`FromStr`] reads.
     pub const NAMES: [&'static str; 3] = ["identity", "log", "cube-root"];
 
-    /// A [`FittedLink`] never returns more than this many times the largest value of its channel
+    /// A [`FittedTransform`] never returns more than this many times the largest value of its channel
     /// in the training set (identity excepted): where a log target is extrapolated, a small error
     /// of the target would else be a firefly, or infinite.
     pub const HEADROOM: f64 = 2.0;
 
-    /// [`Link::Log`] with the offset at a tenth of the median.
+    /// [`TargetTransform::Log`] with the offset at a tenth of the median.
     #[must_use]
     pub fn default_log() -> Self {
         Self::Log { offset: 0.1 }
     }
 
-    /// The link's name.
+    /// The transform's name.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -78,18 +78,18 @@ impl Link {
     ///
     /// # Errors
     /// [`Error::Parameter`] for an offset that is not positive and finite.
-    pub fn fit(self, values: ArrayView2<'_, f64>) -> Result<FittedLink> {
+    pub fn fit(self, values: ArrayView2<'_, f64>) -> Result<FittedTransform> {
         if let Self::Log { offset } = self
             && !(offset > 0.0 && offset.is_finite())
         {
             return Err(Error::Parameter {
-                name: "offset of the log link",
+                name: "offset of the log transform",
                 value: offset,
                 expected: "positive and finite",
             });
         }
         let channels = values.columns().into_iter();
-        Ok(FittedLink {
+        Ok(FittedTransform {
             channels: channels.map(|values| self.channel(values)).collect(),
         })
     }
@@ -119,23 +119,23 @@ fn median_of_positive(values: ArrayView1<'_, f64>) -> Option<f64> {
     (!positive.is_empty()).then(|| *positive.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-impl fmt::Display for Link {
+impl fmt::Display for TargetTransform {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
     }
 }
 
-impl FromStr for Link {
+impl FromStr for TargetTransform {
     type Err = Error;
 
-    /// The link of this name, with its default offset.
+    /// The transform of this name, with its default offset.
     fn from_str(name: &str) -> Result<Self> {
         match name {
             "identity" => Ok(Self::Identity),
             "log" => Ok(Self::default_log()),
             "cube-root" => Ok(Self::CubeRoot),
             _ => Err(Error::UnknownName {
-                what: "link",
+                what: "transform",
                 name: name.to_owned(),
                 expected: Self::NAMES.join(", "),
             }),
@@ -143,9 +143,9 @@ impl FromStr for Link {
     }
 }
 
-/// A [`Link`] that knows the scale of each channel.
+/// A [`TargetTransform`] that knows the scale of each channel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FittedLink {
+pub struct FittedTransform {
     channels: Vec<Channel>,
 }
 
@@ -191,19 +191,19 @@ impl Channel {
     }
 }
 
-impl FittedLink {
+impl FittedTransform {
     /// Number of channels.
     #[must_use]
     pub fn channels(&self) -> usize {
         self.channels.len()
     }
 
-    /// The link of each channel.
+    /// The transform of each channel.
     pub(crate) fn by_channel(&self) -> &[Channel] {
         &self.channels
     }
 
-    /// The links of these channels, in this order.
+    /// The transforms of these channels, in this order.
     pub(crate) fn select(&self, places: &[usize]) -> Self {
         let channels = places.iter().filter_map(|&place| self.channels.get(place));
         Self {
@@ -211,7 +211,7 @@ impl FittedLink {
         }
     }
 
-    /// Whether a link from outside makes sense: every offset positive and finite, every ceiling
+    /// Whether a transform from outside makes sense: every offset positive and finite, every ceiling
     /// finite and not negative.
     ///
     /// # Errors
@@ -228,12 +228,16 @@ impl FittedLink {
             let ceiling = match *channel {
                 Channel::Identity => continue,
                 Channel::Log { offset, .. } if !(offset > 0.0 && offset.is_finite()) => {
-                    return parameter("offset of the link", offset, "positive and finite");
+                    return parameter("offset of the transform", offset, "positive and finite");
                 }
                 Channel::Log { ceiling, .. } | Channel::CubeRoot { ceiling } => ceiling,
             };
             if !(ceiling >= 0.0 && ceiling.is_finite()) {
-                return parameter("ceiling of the link", ceiling, "finite and not negative");
+                return parameter(
+                    "ceiling of the transform",
+                    ceiling,
+                    "finite and not negative",
+                );
             }
         }
         Ok(())
@@ -313,18 +317,18 @@ impl FittedLink {
     /// the offset below 0.
     ///
     /// # Errors
-    /// [`Error::Shape`] for another number of channels than the link was fitted to.
+    /// [`Error::Shape`] for another number of channels than the transform was fitted to.
     pub fn to_targets(&self, values: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
         self.map(values.to_owned(), Channel::target)
     }
 
     /// BRDF values in 1/sr for predicted targets, shape (pairs, channels).
     ///
-    /// Unless the link is the identity they are not negative and at most [`Link::HEADROOM`] times
-    /// the largest value that the link was fitted to. A target that is NaN stays NaN.
+    /// Unless the transform is the identity they are not negative and at most
+    /// [`TargetTransform::HEADROOM`] times the largest value that the transform was fitted to. A target that is NaN stays NaN.
     ///
     /// # Errors
-    /// [`Error::Shape`] for another number of channels than the link was fitted to.
+    /// [`Error::Shape`] for another number of channels than the transform was fitted to.
     pub fn to_values(&self, targets: Array2<f64>) -> Result<Array2<f64>> {
         self.map(targets, Channel::value)
     }
@@ -332,7 +336,7 @@ impl FittedLink {
     fn map(&self, mut matrix: Array2<f64>, f: fn(Channel, f64) -> f64) -> Result<Array2<f64>> {
         if matrix.ncols() != self.channels.len() {
             return Err(Error::Shape {
-                what: "channels of the link",
+                what: "channels of the transform",
                 expected: self.channels.len(),
                 found: matrix.ncols(),
             });
@@ -351,7 +355,11 @@ mod tests {
     use ndarray::array;
     use proptest::prelude::*;
 
-    const LINKS: [Link; 3] = [Link::Identity, Link::Log { offset: 0.5 }, Link::CubeRoot];
+    const LINKS: [TargetTransform; 3] = [
+        TargetTransform::Identity,
+        TargetTransform::Log { offset: 0.5 },
+        TargetTransform::CubeRoot,
+    ];
 
     #[test]
     fn targets_at_hand_computed_values() {
@@ -363,7 +371,9 @@ mod tests {
             [4.0, 40.0],
             [0.0, 40.0]
         ];
-        let log = Link::Log { offset: 0.5 }.fit(values.view()).unwrap();
+        let log = TargetTransform::Log { offset: 0.5 }
+            .fit(values.view())
+            .unwrap();
         let targets = log.to_targets(values.view()).unwrap();
         assert_abs_diff_eq!(
             targets.column(0),
@@ -372,7 +382,7 @@ mod tests {
         );
         assert_abs_diff_eq!(targets[[3, 1]], 5.0_f64.ln(), epsilon = 1e-15);
 
-        let cube = Link::CubeRoot.fit(values.view()).unwrap();
+        let cube = TargetTransform::CubeRoot.fit(values.view()).unwrap();
         let targets = cube.to_targets(array![[8.0, 0.027]].view()).unwrap();
         assert_abs_diff_eq!(targets, array![[2.0, 0.3]], epsilon = 1e-15);
     }
@@ -380,23 +390,23 @@ mod tests {
     #[test]
     fn no_target_gives_a_negative_or_unbounded_value() {
         let values = array![[0.0], [1.0], [3.0]];
-        for link in [Link::default_log(), Link::CubeRoot] {
-            let fitted = link.fit(values.view()).unwrap();
+        for transform in [TargetTransform::default_log(), TargetTransform::CubeRoot] {
+            let fitted = transform.fit(values.view()).unwrap();
             let targets = array![[-1e300], [-1.0], [0.0], [1e9], [f64::INFINITY]];
             let back = fitted.to_values(targets).unwrap();
-            let most = 3.0 * Link::HEADROOM;
+            let most = 3.0 * TargetTransform::HEADROOM;
             let expected = array![[0.0], [0.0], [0.0], [most], [most]];
-            assert_eq!(back, expected, "{link}");
+            assert_eq!(back, expected, "{transform}");
         }
     }
 
     #[test]
     fn an_all_black_channel_stays_black() {
         let values = Array2::zeros((4, 1));
-        for link in LINKS {
-            let fitted = link.fit(values.view()).unwrap();
+        for transform in LINKS {
+            let fitted = transform.fit(values.view()).unwrap();
             let targets = fitted.to_targets(values.view()).unwrap();
-            assert_eq!(fitted.to_values(targets).unwrap(), values, "{link}");
+            assert_eq!(fitted.to_values(targets).unwrap(), values, "{transform}");
         }
     }
 
@@ -406,7 +416,7 @@ mod tests {
         let mut values = Array2::from_elem((40, 1), 0.05);
         values[[0, 0]] = 1e-5;
         values[[1, 0]] = 600.0;
-        let fitted = Link::default_log().fit(values.view()).unwrap();
+        let fitted = TargetTransform::default_log().fit(values.view()).unwrap();
         let targets = fitted.to_targets(values.view()).unwrap();
         let back = fitted.to_values(targets.clone()).unwrap();
         for (&value, &back) in values.iter().zip(&back) {
@@ -423,19 +433,19 @@ mod tests {
     fn wrong_settings_and_shapes_are_refused() {
         let values = array![[1.0, 2.0]];
         for offset in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(Link::Log { offset }.fit(values.view()).is_err());
+            assert!(TargetTransform::Log { offset }.fit(values.view()).is_err());
         }
-        let fitted = Link::CubeRoot.fit(values.view()).unwrap();
+        let fitted = TargetTransform::CubeRoot.fit(values.view()).unwrap();
         assert!(fitted.to_targets(array![[1.0]].view()).is_err());
         assert!(fitted.to_values(array![[1.0]]).is_err());
     }
 
     #[test]
     fn names_are_read_back() {
-        for name in Link::NAMES {
-            assert_eq!(name.parse::<Link>().unwrap().name(), name);
+        for name in TargetTransform::NAMES {
+            assert_eq!(name.parse::<TargetTransform>().unwrap().name(), name);
         }
-        assert!("square".parse::<Link>().is_err());
+        assert!("square".parse::<TargetTransform>().is_err());
     }
 
     proptest! {
@@ -445,12 +455,12 @@ mod tests {
                 prop_oneof![Just(0.0), 1e-6..1.0_f64, 1.0..1e4_f64], 1..30),
         ) {
             let values = Array2::from_shape_vec((values.len(), 1), values).unwrap();
-            for link in LINKS {
-                let fitted = link.fit(values.view()).unwrap();
+            for transform in LINKS {
+                let fitted = transform.fit(values.view()).unwrap();
                 let back = fitted.to_values(fitted.to_targets(values.view()).unwrap()).unwrap();
                 for (&value, &back) in values.iter().zip(&back) {
                     // ln(1 + f/o) stays below 25 here: so many roundings of the target.
-                    prop_assert!((value - back).abs() <= 30.0 * f64::EPSILON * value, "{}", link);
+                    prop_assert!((value - back).abs() <= 30.0 * f64::EPSILON * value, "{}", transform);
                 }
             }
         }
@@ -458,10 +468,10 @@ mod tests {
         #[test]
         fn links_are_monotonic(low in 0.0..10.0_f64, step in 1e-3..10.0_f64, median in 1e-3..1e3_f64) {
             let fitted_to = array![[median]];
-            for link in LINKS {
-                let fitted = link.fit(fitted_to.view()).unwrap();
+            for transform in LINKS {
+                let fitted = transform.fit(fitted_to.view()).unwrap();
                 let targets = fitted.to_targets(array![[low], [low + step]].view()).unwrap();
-                prop_assert!(targets[[0, 0]] < targets[[1, 0]], "{}", link);
+                prop_assert!(targets[[0, 0]] < targets[[1, 0]], "{}", transform);
             }
         }
     }

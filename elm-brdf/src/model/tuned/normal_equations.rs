@@ -20,7 +20,7 @@ const BLOCK: usize = 96;
 /// Sums of products of the columns of a hidden-layer matrix and of a constant with each other and with
 /// the targets.
 #[derive(Debug, Clone)]
-pub(super) struct Moments {
+pub(super) struct NormalEquations {
     /// Of the hidden columns and the constant, shape (neurons + 1, neurons + 1); on and below the
     /// diagonal.
     gram: Array2<f64>,
@@ -42,7 +42,7 @@ impl Weights {
     }
 }
 
-impl Moments {
+impl NormalEquations {
     /// `h` has shape (rows, neurons), `t` (rows, outputs); `weights` are those of squares.
     pub(super) fn of(
         h: ArrayView2<'_, f64>,
@@ -135,9 +135,9 @@ pub(super) struct Factor {
 }
 
 impl Factor {
-    /// The output weights for the targets of `moments`, whose triangle this is.
-    pub(super) fn solve(&self, moments: &Moments) -> Result<Weights> {
-        let x = self.triangle.solve(&moments.cross)?;
+    /// The output weights for the targets of `equations`, whose triangle this is.
+    pub(super) fn solve(&self, equations: &NormalEquations) -> Result<Weights> {
+        let x = self.triangle.solve(&equations.cross)?;
         let (beta, constant) = x.view().split_at(Axis(0), x.nrows() - 1);
         Ok(Weights {
             beta: beta.to_owned(),
@@ -201,7 +201,7 @@ mod tests {
     fn weights_are_those_of_the_singular_value_decomposition() {
         for (rows, neurons) in [(150, 101), (60, 101)] {
             let (h, t) = problem(rows, neurons);
-            let moments = Moments::of(h.view(), t.view(), None);
+            let equations = NormalEquations::of(h.view(), t.view(), None);
             let validator =
                 CrossValidator::new(&LeastSquares::new(&h, &t).unwrap().with_intercept(true))
                     .unwrap();
@@ -209,8 +209,8 @@ mod tests {
                 let solution = validator.solve(&[relative]).unwrap();
                 // The same absolute strength; the library's are relative.
                 let largest = solution.diagnosis.largest_singular_value.powi(2);
-                let factor = moments.factor(relative * largest).unwrap();
-                let weights = factor.solve(&moments).unwrap();
+                let factor = equations.factor(relative * largest).unwrap();
+                let weights = factor.solve(&equations).unwrap();
                 let predicted = weights.apply(h.view());
                 let expected = h.dot(&solution.beta) + &solution.intercept;
                 // Of normal equations of n columns: n epsilon times their condition, which the
@@ -227,7 +227,7 @@ mod tests {
         let (h, t) = problem(90, 20);
         let weights = Array1::from_shape_fn(90, |i| 1.0 + (i % 3) as f64);
         let part = |rows: std::ops::Range<usize>| {
-            Moments::of(
+            NormalEquations::of(
                 h.slice_axis(Axis(0), Slice::from(rows.clone())),
                 t.slice_axis(Axis(0), Slice::from(rows.clone())),
                 Some(&weights.slice_axis(Axis(0), Slice::from(rows)).to_owned()),
@@ -247,8 +247,8 @@ mod tests {
     #[test]
     fn what_is_indefinite_or_not_a_number_has_no_factor() {
         let (h, t) = problem(30, 5);
-        let moments = Moments::of(h.view(), t.view(), None);
-        assert!(moments.factor(-1e6).is_none());
-        assert!(moments.factor(f64::NAN).is_none());
+        let equations = NormalEquations::of(h.view(), t.view(), None);
+        assert!(equations.factor(-1e6).is_none());
+        assert!(equations.factor(f64::NAN).is_none());
     }
 }

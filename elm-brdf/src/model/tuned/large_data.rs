@@ -12,9 +12,9 @@ use super::problem::Problem;
 use super::{Drawn, TIE, Tuned, better, dataset};
 use crate::error::{Error, Result};
 use crate::features::Features;
-use crate::link::FittedLink;
 use crate::metrics::{Metric, Metrics};
 use crate::streams::{self, generator};
+use crate::target_transform::FittedTransform;
 use elm_datasets::geometry::DirectionPair;
 
 /// Neurons unless said otherwise: some 675 numbers for three channels.
@@ -34,13 +34,13 @@ const FINISHED: usize = 2;
 /// How close that is.
 const CLOSE: f64 = 1.15;
 /// Sets that are fitted to all rows, at most, where none returns less light than it receives.
-const MOST_FINISHED: usize = 4;
+const MAX_FINISHED: usize = 4;
 /// Sets whose scales are moved, at most, and how far off these may be at first.
 const MOVED: usize = 3;
 const FAR: f64 = 1.6;
 /// Inputs that turn with the surface are taken where their error is this many times smaller: a grain is
 /// plain to see, or none.
-const GRAIN: f64 = 1.25;
+const ANISOTROPY_GAIN: f64 = 1.25;
 /// Where every scale begins.
 const FIRST_SCALE: f64 = 0.7;
 
@@ -59,13 +59,13 @@ pub(super) fn search_rows(tuned: &Tuned, rows: usize) -> Vec<usize> {
 /// The best settings for these targets, the best first.
 pub(super) fn search(
     tuned: &Tuned,
-    link: &FittedLink,
+    transform: &FittedTransform,
     pairs: &[DirectionPair],
     values: ArrayView2<'_, f64>,
     rows: &[usize],
     sets: &[Features],
 ) -> Result<Vec<Setting>> {
-    Search::new(tuned, link, pairs, values, rows)?.best(sets)
+    Search::new(tuned, transform, pairs, values, rows)?.best(sets)
 }
 
 /// The best network of some of the settings.
@@ -79,7 +79,7 @@ pub(super) fn best(
         let physical = found.as_ref().is_some_and(|found| found.excess <= 0.0);
         let usual = setting.set == Features::SumDifference;
         let close = usual || number < FINISHED && setting.error <= CLOSE * settings[0].error;
-        if physical && !close || number >= MOST_FINISHED && !usual {
+        if physical && !close || number >= MAX_FINISHED && !usual {
             continue;
         }
         let finished = finished(problem, setting, rows)?;
@@ -106,7 +106,7 @@ fn finished(problem: &Problem<'_>, setting: &Setting, rows: &[usize]) -> Result<
     let neurons = tuned.size(NEURONS, x.nrows(), x.ncols(), channels, drawn)?;
     let count = drawn(neurons);
     let few = &rows[..rows.len().min(PRUNE_ROWS.max(count))];
-    let params = tuned.waves(count, &setting.scales);
+    let params = tuned.sine_features(count, &setting.scales);
     let layer = Drawn::new(&params, x.ncols(), &scaler)?;
     let params = params.with_solver(Ridge::relative(RIDGE));
     let (few_x, few_targets) = (x.select(Axis(0), few), problem.targets(few));
@@ -152,7 +152,7 @@ pub(super) struct Setting {
 
 impl Setting {
     /// Whether its inputs turn with the surface.
-    pub(super) fn has_grain(&self) -> bool {
+    pub(super) fn is_anisotropic(&self) -> bool {
         !self.set.is_isotropic()
     }
 
@@ -168,7 +168,7 @@ impl Setting {
 
 struct Search<'a> {
     tuned: &'a Tuned,
-    link: &'a FittedLink,
+    transform: &'a FittedTransform,
     fitted: Part,
     judged: Part,
 }
@@ -185,16 +185,16 @@ impl<'a> Search<'a> {
     /// The first half of `rows` is fitted, the second judges.
     fn new(
         tuned: &'a Tuned,
-        link: &'a FittedLink,
+        transform: &'a FittedTransform,
         pairs: &[DirectionPair],
         values: ArrayView2<'_, f64>,
         rows: &[usize],
     ) -> Result<Self> {
-        let targets = link.to_targets(values)?;
+        let targets = transform.to_targets(values)?;
         let (fitted, judged) = rows.split_at(rows.len() / 2);
         Ok(Self {
             tuned,
-            link,
+            transform,
             fitted: part(pairs, values, &targets, fitted),
             judged: part(pairs, values, &targets, judged),
         })
@@ -248,7 +248,7 @@ impl<'a> Search<'a> {
         let mut settings: Vec<Setting> = found.into_iter().map(|(_, best)| best).collect();
         let handicap = |setting: &Setting| {
             if !setting.set.is_isotropic() {
-                GRAIN * setting.error
+                ANISOTROPY_GAIN * setting.error
             } else if setting.set.is_reciprocal() {
                 setting.error
             } else {
@@ -260,13 +260,13 @@ impl<'a> Search<'a> {
     }
 
     fn try_scales(&self, inputs: &Inputs, scales: Vec<f64>) -> Result<Setting> {
-        let params = self.tuned.waves(SEARCH_NEURONS, &scales);
+        let params = self.tuned.sine_features(SEARCH_NEURONS, &scales);
         let map = Drawn::new(&params, scales.len(), &inputs.scaler)?.map;
         let params = params.with_solver(Ridge::relative(RIDGE));
         let data = dataset(&inputs.fitted, &self.fitted.targets, None)?;
         let network = params.fit_map(map, &data)?;
         let targets = network.predict(&inputs.judged)?;
-        let predicted = self.link.to_values(targets.clone())?;
+        let predicted = self.transform.to_values(targets.clone())?;
         Ok(Setting {
             set: inputs.set,
             scales,

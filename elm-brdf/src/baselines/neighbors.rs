@@ -7,7 +7,7 @@ use super::inputs::{Frame, squared_distances};
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::fit::{Fit, Model, assign};
-use crate::link::Link;
+use crate::target_transform::TargetTransform;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::DirectionPair;
 
@@ -19,11 +19,11 @@ use elm_datasets::geometry::DirectionPair;
 ///
 /// D. Shepard, *A Two-Dimensional Interpolation Function for Irregularly-Spaced Data*, 1968.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Neighbours {
+pub struct Neighbors {
     /// Inputs.
     pub features: Features,
     /// Target.
-    pub link: Link,
+    pub transform: TargetTransform,
     /// How many neighbours, at least 1; all nodes where there are fewer.
     pub count: usize,
 }
@@ -34,7 +34,7 @@ const POWERS: std::ops::RangeInclusive<i32> = 1..=8;
 const MAX_TRIALS: usize = 1000;
 
 /// Measurements kept by [`Neighbours`].
-pub struct NeighboursModel {
+pub struct NeighborsModel {
     frame: Frame,
     count: usize,
     nodes: Array2<f64>,
@@ -44,20 +44,20 @@ pub struct NeighboursModel {
     powers: Vec<i32>,
 }
 
-impl Neighbours {
+impl Neighbors {
     /// A single neighbour.
     #[must_use]
-    pub fn nearest(features: Features, link: Link) -> Self {
+    pub fn nearest(features: Features, transform: TargetTransform) -> Self {
         Self {
             features,
-            link,
+            transform,
             count: 1,
         }
     }
 }
 
-impl Fit for Neighbours {
-    type Model = NeighboursModel;
+impl Fit for Neighbors {
+    type Model = NeighborsModel;
 
     fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         if self.count == 0 {
@@ -67,13 +67,13 @@ impl Fit for Neighbours {
                 expected: "at least 1",
             });
         }
-        let (frame, nodes, targets) = Frame::fit(self.features, self.link, pairs, values)?;
+        let (frame, nodes, targets) = Frame::fit(self.features, self.transform, pairs, values)?;
         let powers = if self.count == 1 {
             vec![*POWERS.start(); targets.ncols()]
         } else {
             best_powers(&nodes, &targets, self.count)
         };
-        Ok(NeighboursModel {
+        Ok(NeighborsModel {
             frame,
             count: self.count,
             nodes,
@@ -147,7 +147,7 @@ fn weighted(near: &[(usize, f64)], targets: &Array2<f64>, power: i32) -> Array1<
     if total > 0.0 { sum / total } else { sum }
 }
 
-impl NeighboursModel {
+impl NeighborsModel {
     fn values_at(&self, pairs: &[DirectionPair]) -> Result<Array2<f64>> {
         let points = self.frame.points(pairs)?;
         let mut targets = Array2::zeros((pairs.len(), self.channels()));
@@ -168,7 +168,7 @@ impl NeighboursModel {
     }
 }
 
-impl Brdf for NeighboursModel {
+impl Brdf for NeighborsModel {
     fn channels(&self) -> usize {
         self.frame.channels()
     }
@@ -182,7 +182,7 @@ impl Brdf for NeighboursModel {
     }
 }
 
-impl Model for NeighboursModel {
+impl Model for NeighborsModel {
     fn floats_per_channel(&self) -> usize {
         // Nodes and targets, and the power.
         self.nodes.len() + self.nodes.nrows() + 1 + self.frame.floats_per_channel()
