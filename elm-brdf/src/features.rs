@@ -178,8 +178,8 @@ impl Features {
     /// The inputs of each pair of directions, shape (pairs, inputs).
     ///
     /// All sets but [`Anisotropic`](Self::Anisotropic) depend on the angles $\theta_i$, $\theta_o$ and
-    /// $|\varphi_i - \varphi_o|$ alone, as an isotropic surface does. Finite for every pair of unit vectors, those below
-    /// the horizon, grazing or coincident included.
+    /// $|\varphi_i - \varphi_o|$ alone, as an isotropic surface does. Finite for every pair of unit vectors,
+    /// those below the horizon, grazing or coincident included.
     #[must_use]
     pub fn compute(self, pairs: &[DirectionPair]) -> Array2<f64> {
         let mut out = Array2::zeros((pairs.len(), self.inputs().len()));

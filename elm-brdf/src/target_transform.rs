@@ -325,7 +325,8 @@ impl FittedTransform {
     /// BRDF values in 1/sr for predicted targets, shape (pairs, channels).
     ///
     /// Unless the transform is the identity they are not negative and at most
-    /// [`TargetTransform::HEADROOM`] times the largest value that the transform was fitted to. A target that is NaN stays NaN.
+    /// [`TargetTransform::HEADROOM`] times the largest value that the transform was fitted to. A target that
+    /// is NaN stays NaN.
     ///
     /// # Errors
     /// [`Error::Shape`] for another number of channels than the transform was fitted to.

@@ -7,13 +7,15 @@ mod support;
 use support::Program;
 
 /// Every subcommand, with those of its own.
-const COMMANDS: [&str; 12] = [
+const COMMANDS: [&str; 14] = [
     "",
     "reproduce",
     "compare",
     "pareto",
     "fit",
     "eval",
+    "predict",
+    "info",
     "prior",
     "prior build",
     "render",

@@ -87,6 +87,22 @@ impl Table {
         }
     }
 
+    /// The text of the cells of these columns, row by row.
+    pub(crate) fn cells(
+        path: &Path,
+        bytes: &[u8],
+        columns: &[usize],
+    ) -> Result<Vec<Vec<String>>, Error> {
+        let source = Source { path, bytes };
+        let reader = ReaderBuilder::new().has_headers(true).from_reader(bytes);
+        let rows = reader.into_records().map(|record| {
+            let record = record.map_err(|reason| source.error(reason))?;
+            let cell = |&column: &usize| record.get(column).unwrap_or("").trim().to_owned();
+            Ok(columns.iter().map(cell).collect())
+        });
+        rows.collect()
+    }
+
     /// The table, and the byte at which the record of each row begins, for [`line_of`]. `cells_of`
     /// says what a column may hold, by its number.
     pub(crate) fn parse(

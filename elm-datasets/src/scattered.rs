@@ -37,6 +37,7 @@
 mod angles;
 mod columns;
 mod dialect;
+mod directions;
 mod long;
 mod names;
 mod note;
@@ -55,6 +56,7 @@ pub(crate) use angles::HORIZON_TOLERANCE;
 use angles::{Found, Reader};
 use columns::{Angle, Plan};
 use dialect::{Separator, Text};
+pub use directions::DirectionTable;
 pub use note::Note;
 pub use write::{to_writer, write};
 
@@ -329,13 +331,7 @@ fn reflected(
     let (mut rows, mut pairs) = (Vec::new(), Vec::new());
     let (mut below, mut transmitted) = (None, 0);
     for (row, cells) in table.values.rows().into_iter().enumerate() {
-        let found = match plan.directions {
-            columns::Directions::Angles(angles) => reader.angles(angles.map(|angle| match angle {
-                Angle::Column(column) => cells[column],
-                Angle::Constant(constant) => constant,
-            })),
-            columns::Directions::Vectors(columns) => reader.vectors(columns.map(|c| cells[c])),
-        };
+        let found = plan.directions.read(&mut reader, cells);
         match found.map_err(|problem| (Some(row), problem))? {
             Found::Reflected(pair) => {
                 rows.push(row);

@@ -10,9 +10,11 @@ mod export;
 mod fetch;
 mod fit;
 mod gallery;
+mod info;
 mod models;
 mod overwrite;
 mod pareto;
+mod predict;
 mod prior;
 mod render;
 mod reproduce;
@@ -41,6 +43,8 @@ enum Command {
     Pareto(pareto::Arguments),
     Fit(fit::Arguments),
     Eval(eval::Arguments),
+    Predict(predict::Arguments),
+    Info(info::Arguments),
     Prior(prior::Arguments),
     #[cfg(feature = "fetch")]
     Fetch(fetch::Arguments),
@@ -81,6 +85,8 @@ pub fn run() -> ExitCode {
             Command::Reproduce(arguments) => reproduce::run(&arguments),
             Command::Fit(arguments) => fit::run(&arguments),
             Command::Eval(arguments) => eval::run(&arguments),
+            Command::Predict(arguments) => predict::run(&arguments),
+            Command::Info(arguments) => info::run(&arguments),
             Command::Prior(arguments) => prior::run(&arguments),
             Command::Render(arguments) => render::run(&arguments),
             Command::Export(arguments) => export::run(&arguments),

@@ -34,24 +34,31 @@ fn angle(text: &str) -> Result<(usize, f64), String> {
     }
 }
 
+/// What a table does not say of its directions.
+#[derive(Debug, Args)]
+pub(super) struct AngleReading {
+    /// Angles of a CSV file are in degrees rather than radians.
+    #[arg(long)]
+    degrees: bool,
+    /// An angle that is the same in every row of a table and so no column of it: theta_i=30, in the
+    /// unit of the file. For several angles, several times.
+    #[arg(long = "angle", value_name = "NAME=NUMBER", value_parser = angle)]
+    angles: Vec<(usize, f64)>,
+}
+
 /// What the samples themselves do not say.
 #[derive(Debug, Args)]
 pub(super) struct Reading {
     #[command(flatten)]
     pub(super) folder: DataFolder,
-    /// Angles of a CSV file are in degrees rather than radians.
-    #[arg(long)]
-    degrees: bool,
+    #[command(flatten)]
+    pub(super) angles: AngleReading,
     /// Values of a CSV file are BRDF times the cosine of theta_i, or of theta_o, the scatter angle,
     /// with --cosine-weighted=theta_o.
     #[arg(long, value_name = "ANGLE", num_args = 0..=1, require_equals = true,
           default_missing_value = "theta_i",
           value_parser = PossibleValuesParser::new(["theta_i", "theta_o"]))]
     cosine_weighted: Option<String>,
-    /// An angle that is the same in every row of a table and so no column of it: theta_i=30, in the
-    /// unit of the file. For several angles, several times.
-    #[arg(long = "angle", value_name = "NAME=NUMBER", value_parser = angle)]
-    angles: Vec<(usize, f64)>,
     /// Values of a table are reflectance factors, BRDF times pi. Columns named BRF are taken for these
     /// without being told.
     #[arg(long)]
@@ -118,6 +125,28 @@ impl Material {
     }
 }
 
+impl AngleReading {
+    pub(super) fn unit(&self) -> AngleUnit {
+        if self.degrees {
+            AngleUnit::Degrees
+        } else {
+            AngleUnit::Radians
+        }
+    }
+
+    /// The angles given for all rows.
+    pub(super) fn constants(&self) -> Result<[Option<f64>; 4], Failure> {
+        let mut angles = [None; 4];
+        for &(place, value) in &self.angles {
+            if angles[place].replace(value).is_some() {
+                let name = ANGLES[place];
+                return Err(Failure::Usage(format!("--angle {name} is given twice")));
+            }
+        }
+        Ok(angles)
+    }
+}
+
 impl Reading {
     /// Reads `name`: a file, `curet:` and a number or name, or `synthetic:paint`.
     pub(super) fn read(&self, name: &str) -> Result<Material, Failure> {
@@ -129,18 +158,14 @@ impl Reading {
         }
         let options = OpenOptions {
             scattered: scattered::Options {
-                unit: if self.degrees {
-                    AngleUnit::Degrees
-                } else {
-                    AngleUnit::Radians
-                },
+                unit: self.angles.unit(),
                 cosine_weighted: self.cosine_weighted.as_deref() == Some("theta_i"),
             },
             columns: scattered::Columns {
                 channels: self.channels.clone(),
                 ignore: self.ignore.clone(),
                 scatter_cosine: self.cosine_weighted.as_deref() == Some("theta_o"),
-                angles: self.constant_angles()?,
+                angles: self.angles.constants()?,
                 reflectance_factor: self.reflectance_factor,
             },
             sampling: Sampling::Random {
@@ -178,18 +203,6 @@ impl Reading {
             say(&format!("note: {shown}: {}", material.counts(self.invalid)));
         }
         Ok(material)
-    }
-
-    /// The angles given for all rows.
-    fn constant_angles(&self) -> Result<[Option<f64>; 4], Failure> {
-        let mut angles = [None; 4];
-        for &(place, value) in &self.angles {
-            if angles[place].replace(value).is_some() {
-                let name = ANGLES[place];
-                return Err(Failure::Usage(format!("--angle {name} is given twice")));
-            }
-        }
-        Ok(angles)
     }
 
     /// The files that [`read`](Self::read) reads for `name`.

@@ -9,6 +9,17 @@ use crate::error::{Error, Result};
 use elm_datasets::Brdf;
 
 impl BrdfModel {
+    /// A name for each channel: those of the measurements, or `channel 1` and so on where they have none.
+    #[must_use]
+    pub fn channel_names(&self) -> Vec<String> {
+        let own = &self.provenance.channels;
+        if own.len() == self.channels() {
+            return own.clone();
+        }
+        let numbers = 1..=self.channels();
+        numbers.map(|number| format!("channel {number}")).collect()
+    }
+
     /// The samples with the channels of this model, in its order: matched by name, colour or
     /// wavelength. A model whose channels have no names takes them as they come.
     ///

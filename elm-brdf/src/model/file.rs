@@ -79,7 +79,7 @@ impl TryFrom<File> for BrdfModel {
 impl Persist for BrdfModel {
     const KIND: &'static str = "elm-brdf model";
     const SCALAR: &'static str = "f64";
-    const VERSION: u32 = 3;
+    const VERSION: u32 = 4;
 
     fn check(&self) -> Result<(), persist::Error> {
         let groups = self.network.hidden().groups();

@@ -92,6 +92,8 @@ pub struct Provenance {
     pub noise_floor: Option<f64>,
     /// The prior that the fit leans on.
     pub prior: Option<String>,
+    /// The largest polar angles measured in radians, of the light and of the viewer.
+    pub measured_to: Option<[f64; 2]>,
 }
 
 impl BrdfModel {

@@ -461,7 +461,15 @@ fn provenance(
         .map(|floor| floor.sigma)
         .collect();
     let channels = floors.len();
+    let largest = |cosine: fn(&DirectionPair) -> f64| {
+        let least = pairs.iter().map(cosine).fold(1.0, f64::min);
+        least.acos()
+    };
     Provenance {
+        measured_to: Some([
+            largest(|pair| pair.incident[2]),
+            largest(|pair| pair.outgoing[2]),
+        ]),
         rows: pairs.len(),
         seed,
         metric: Some(metric),

@@ -1,5 +1,8 @@
 //! Which columns of a table are directions, which are reflectance, and which are neither.
 
+use ndarray::ArrayView1;
+
+use super::angles::{self, Reader};
 use super::names::{self, Direction, Named, Side};
 use super::{Columns, Note};
 use crate::channel::{self, Kind};
@@ -46,10 +49,26 @@ impl Directions {
             Self::Vectors(places) => places.contains(&column),
         }
     }
+
+    /// The directions of a row with these `cells`.
+    pub(super) fn read(
+        &self,
+        reader: &mut Reader,
+        cells: ArrayView1<'_, f64>,
+    ) -> Result<angles::Found, Problem> {
+        match self {
+            Self::Angles(angles) => reader.angles(angles.map(|angle| match angle {
+                Angle::Column(column) => cells[column],
+                Angle::Constant(constant) => constant,
+            })),
+            Self::Vectors(columns) => reader.vectors(columns.map(|c| cells[c])),
+        }
+    }
 }
 
 impl Plan {
-    pub(super) fn new(names: &[String], choice: &Columns) -> Result<Self, Problem> {
+    /// Directions alone: all other columns are left out.
+    pub(super) fn of_directions(names: &[String], choice: &Columns) -> Result<Self, Problem> {
         let ignored = |name: &String| {
             let mut ignore = choice.ignore.iter();
             ignore.any(|other| other.trim().eq_ignore_ascii_case(name.trim()))
@@ -63,6 +82,19 @@ impl Plan {
             unit,
             notes,
         } = find_directions(names, &named, choice)?;
+        Ok(Self {
+            directions,
+            channels: Vec::new(),
+            wavelength: None,
+            left_out: Vec::new(),
+            unit,
+            notes,
+        })
+    }
+
+    pub(super) fn new(names: &[String], choice: &Columns) -> Result<Self, Problem> {
+        let plan = Self::of_directions(names, choice)?;
+        let directions = plan.directions;
         let mut rest: Vec<usize> = (0..names.len())
             .filter(|&column| !directions.contains(column))
             .collect();
@@ -107,12 +139,10 @@ impl Plan {
             return Err(Problem::SeveralPerWavelength { columns });
         }
         Ok(Self {
-            directions,
             channels,
             wavelength,
             left_out,
-            unit,
-            notes,
+            ..plan
         })
     }
 }

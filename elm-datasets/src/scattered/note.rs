@@ -25,6 +25,13 @@ pub enum Note {
         /// Unit of the angles.
         unit: AngleUnit,
     },
+    /// Rows of a table of directions with the viewer below the surface.
+    BelowSurface {
+        /// How many.
+        rows: usize,
+        /// Unit of the angles.
+        unit: AngleUnit,
+    },
     /// Degrees that may be radians.
     LooksLikeRadians {
         /// The largest polar angle.
@@ -104,10 +111,14 @@ impl fmt::Display for Note {
                     f,
                     "{rows} rows have the viewer below the surface (transmitted light) and were left out"
                 )?;
-                match unit {
-                    AngleUnit::Radians => f.write_str("; if the angles are degrees, say --degrees"),
-                    AngleUnit::Degrees => Ok(()),
-                }
+                or_degrees(f, *unit)
+            }
+            Self::BelowSurface { rows, unit } => {
+                write!(
+                    f,
+                    "{rows} rows have the viewer below the surface, where the reflectance is 0"
+                )?;
+                or_degrees(f, *unit)
             }
             Self::LooksLikeRadians { theta } => write!(
                 f,
@@ -158,5 +169,13 @@ impl fmt::Display for Note {
                  {channels} channels"
             ),
         }
+    }
+}
+
+/// What may be the reason of polar angles beyond the horizon.
+fn or_degrees(f: &mut fmt::Formatter<'_>, unit: AngleUnit) -> fmt::Result {
+    match unit {
+        AngleUnit::Radians => f.write_str("; if the angles are degrees, say --degrees"),
+        AngleUnit::Degrees => Ok(()),
     }
 }

@@ -199,6 +199,7 @@ pub fn write_fitted_lobes(
 }
 
 /// The pictures that [`write`] and [`write_lobes`] make, without extensions.
+#[cfg(feature = "cli")]
 pub(crate) const NAMES: [&str; 4] = [
     "predicted-against-measured",
     "error-by-angle",
