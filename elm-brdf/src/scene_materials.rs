@@ -80,6 +80,65 @@ pub struct MaterialTable {
     pub conserve_energy: bool,
 }
 
+impl MaterialTable {
+    /// The material in a file of one's own: a saved model, measurements, to which a network is fitted, or a
+    /// measured table (MERL, RGL), shown as it is.
+    ///
+    /// # Errors
+    /// Those of [`Format::of`] but [`UnknownFormat`](elm_datasets::Error::UnknownFormat), for such a file is a
+    /// model's.
+    pub fn of_file(path: &Path) -> Result<Self> {
+        let file = Some(path.to_owned());
+        let none = Self::default();
+        Ok(match Format::of(path) {
+            Ok(Format::Merl | Format::Rgl) => Self {
+                table: file,
+                ..none
+            },
+            Ok(_) => Self { csv: file, ..none },
+            Err(elm_datasets::Error::UnknownFormat { .. }) => Self {
+                model: file,
+                ..none
+            },
+            Err(error) => return Err(error.into()),
+        })
+    }
+
+    /// The lines of a scene that say where the material comes from.
+    pub(crate) fn to_toml(&self) -> String {
+        let quoted = |text: &str| toml::Value::from(text).to_string();
+        let path = |path: &PathBuf| quoted(&path.to_string_lossy());
+        let sources = [
+            ("curet", self.curet.as_deref().map(quoted)),
+            ("csv", self.csv.as_ref().map(path)),
+            ("model", self.model.as_ref().map(path)),
+            ("table", self.table.as_ref().map(path)),
+        ];
+        let lines = sources
+            .into_iter()
+            .filter_map(|(name, value)| Some(format!("{name} = {}", value?)));
+        lines.collect::<Vec<_>>().join("\n")
+    }
+}
+
+/// The table of a file, as it is.
+///
+/// # Errors
+/// Those of [`Format::of`] and of the readers; [`Error::UnknownName`] for a file that is no table.
+pub fn measured_table(path: &Path) -> Result<Box<dyn Brdf>> {
+    Ok(match Format::of(path)? {
+        Format::Merl => Box::new(Merl::read(path)?),
+        Format::Rgl => Box::new(Rgl::read(path)?),
+        other => {
+            return Err(Error::UnknownName {
+                what: "table",
+                name: other.name().to_owned(),
+                expected: "merl, rgl".to_owned(),
+            });
+        }
+    })
+}
+
 /// A model and where it comes from, in a word: "CUReT", "synthetic", a file's name, "analytic".
 pub struct Fitted {
     /// The model.
@@ -247,18 +306,7 @@ impl SceneMaterialLoader {
         };
         match table.source()? {
             Source::Table(file) => {
-                let path = dir.join(file);
-                let brdf: Arc<dyn Brdf> = match Format::of(&path)? {
-                    Format::Merl => Arc::new(Merl::read(&path)?),
-                    Format::Rgl => Arc::new(Rgl::read(&path)?),
-                    other => {
-                        return Err(Error::UnknownName {
-                            what: "table",
-                            name: other.name().to_owned(),
-                            expected: "merl, rgl".to_owned(),
-                        });
-                    }
-                };
+                let brdf = Arc::from(measured_table(&dir.join(file))?);
                 Ok(plain(brdf, format!("measured, {}", file.display())))
             }
             Source::Formula(name) => Ok(plain(

@@ -18,18 +18,22 @@ const COMPARED: [usize; 3] = [1, 15, 25];
 /// - `comparison`: interpolated, fitted and analytic side by side, with the differences;
 /// - `mesh`: a torus knot in a studio.
 ///
-/// `material`, a number or name of CUReT or of the synthetic data, takes the place of the one material
+/// `material` takes the place of the one material
 /// of `contact-sheet` and `mesh`, and of the three of `comparison`.
 ///
 /// # Errors
 /// [`Error::UnknownBuiltin`] for another name.
-pub fn builtin(name: &str, material: Option<&str>) -> Result<Sheet, Error> {
+pub fn builtin(name: &str, material: Option<&MaterialTable>) -> Result<Sheet, Error> {
     let file = format!("builtin:{name}");
     let parse = |text: &str| Scene::parse(text, file.as_ref());
-    // As a TOML string.
-    let quoted = |name: &str| toml::Value::from(name).to_string();
-    let subject =
-        |text: &str, default: &str| text.replace("SUBJECT", &quoted(material.unwrap_or(default)));
+    let of_curet = |id: &str| MaterialTable {
+        curet: Some(id.to_owned()),
+        ..MaterialTable::default()
+    };
+    let subject = |text: &str, default: &str| {
+        let default = of_curet(default);
+        text.replace("SUBJECT", &material.unwrap_or(&default).to_toml())
+    };
     match name {
         "materials" => Ok(parse(&materials())?.into()),
         "mesh" => Ok(parse(&subject(MESH, "39"))?.into()),
@@ -52,11 +56,11 @@ pub fn builtin(name: &str, material: Option<&str>) -> Result<Sheet, Error> {
         }
         "comparison" => {
             let materials = match material {
-                Some(name) => vec![name.to_owned()],
-                None => COMPARED.map(|id| id.to_string()).to_vec(),
+                Some(material) => vec![material.clone()],
+                None => COMPARED.map(|id| of_curet(&id.to_string())).to_vec(),
             };
             let mut panels = Vec::new();
-            for name in materials {
+            for material in materials {
                 let first = panels.len();
                 for (title, fit) in [
                     ("{name}: interpolated", "interpolation"),
@@ -64,7 +68,7 @@ pub fn builtin(name: &str, material: Option<&str>) -> Result<Sheet, Error> {
                     ("GGX + Oren-Nayar", "ggx+oren-nayar"),
                 ] {
                     let text = COMPARISON
-                        .replace("SUBJECT", &quoted(&name))
+                        .replace("SUBJECT", &material.to_toml())
                         .replace("FIT", fit);
                     panels.push(Panel {
                         title: title.to_owned(),
@@ -151,7 +155,7 @@ target = [0, 0, 0]
 height = 2.3
 
 [material.subject]
-curet = SUBJECT
+SUBJECT
 
 [[sphere]]
 center = [0, 0, 0]
@@ -175,7 +179,7 @@ target = [0, 0, 0]
 height = 2.3
 
 [material.subject]
-curet = SUBJECT
+SUBJECT
 fit = 'FIT'
 
 [[sphere]]
@@ -205,7 +209,7 @@ builtin = 'studio'
 rotation = -20
 
 [material.subject]
-curet = SUBJECT
+SUBJECT
 
 [material.floor]
 analytic = 'oren-nayar'
@@ -230,8 +234,12 @@ mod tests {
 
     #[test]
     fn every_built_in_scene_is_well_formed() {
+        let table = MaterialTable {
+            curet: Some("it's \"quoted\"\n".to_owned()),
+            ..MaterialTable::default()
+        };
         for name in NAMES {
-            for material in [None, Some("it's \"quoted\"\n")] {
+            for material in [None, Some(&table)] {
                 let sheet = builtin(name, material).unwrap();
                 assert_eq!(sheet.panels.len() % sheet.columns, 0, "{name}");
             }

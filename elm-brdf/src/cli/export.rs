@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use elm_datasets::{Brdf, STANDARD_INPUT};
 
-use super::common::{library, one_of, usage};
+use super::common::{one_of, usage};
 use super::samples::Reading;
 use super::{Failure, overwrite, say};
 use crate::error::Error;
@@ -12,7 +13,7 @@ use crate::export::{ExportError, Format, Language, header, merl_table, source};
 use crate::file;
 use crate::model::BrdfModel;
 use crate::recipes;
-use crate::scene_materials::MaterialTable;
+use crate::scene_materials::measured_table;
 
 /// Write a model as source code or as a table, for other programs.
 ///
@@ -23,7 +24,8 @@ use crate::scene_materials::MaterialTable;
 /// mean.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// A saved model, or 'curet:NAME' or 'csv:FILE' for one that is fitted now.
+    /// A saved model; or whatever 'fit' takes, to which a network is fitted now: a file (.csv or another
+    /// table, MERL .binary, RGL .bsdf, pbrt-v2 .brdf), - for standard input, or 'curet:NAME'.
     model: String,
     /// The file: .glsl, .wgsl, .hlsl, .c, .h (guarded, functions static) or .binary, unless
     /// --format says what it is.
@@ -35,6 +37,9 @@ pub(super) struct Arguments {
     /// What the names of the source's functions begin with.
     #[arg(long, default_value = "elm")]
     name: String,
+    /// Resample a measured table (MERL .binary, RGL .bsdf) itself, not a network fitted to it.
+    #[arg(long)]
+    exact: bool,
     #[command(flatten)]
     reading: Reading,
 }
@@ -50,19 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         None => reading.inputs(&arguments.model),
     };
     overwrite::refuse([arguments.output.as_path()], &inputs)?;
-    let brdf = match arguments.model.strip_prefix("csv:") {
-        Some(file) => {
-            let samples = reading.read(file)?.samples.in_rgb_order();
-            let pairs = &samples.directions;
-            recipes::network(None).fit(pairs, samples.values.view())?
-        }
-        None => {
-            let library = library(reading.folder.data.as_deref())?;
-            library
-                .model(&asked(&arguments.model), Path::new(""))?
-                .model
-        }
-    };
+    let brdf = arguments.material()?;
     match format {
         Format::Merl => {
             let (table, apart) = merl_table(&*brdf)?;
@@ -87,17 +80,52 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The material that a scene would call so.
-fn asked(model: &str) -> MaterialTable {
-    let none = MaterialTable::default();
-    match model.split_once(':') {
-        Some(("curet", name)) => MaterialTable {
-            curet: Some(name.to_owned()),
-            ..none
-        },
-        _ => MaterialTable {
-            model: Some(model.into()),
-            ..none
-        },
+impl Arguments {
+    /// The name of the measurements, if it is such a name.
+    fn samples(&self) -> Result<Option<&str>, Failure> {
+        let name = self.model.as_str();
+        if let Some(file) = name.strip_prefix("csv:") {
+            return Ok(Some(file));
+        }
+        if name.starts_with("curet:") || name.starts_with("synthetic:") || name == STANDARD_INPUT {
+            return Ok(Some(name));
+        }
+        Ok(match elm_datasets::Format::of(name) {
+            Ok(_) => Some(name),
+            // What no reader of measurements knows is a model's file.
+            Err(elm_datasets::Error::UnknownFormat { .. }) => None,
+            Err(error) => return Err(error.into()),
+        })
+    }
+
+    /// What is exported.
+    fn material(&self) -> Result<Box<dyn Brdf>, Failure> {
+        let samples = self.samples()?;
+        if self.exact {
+            let name = samples.unwrap_or(&self.model);
+            return measured_table(Path::new(name)).map_err(|error| match error {
+                Error::UnknownName { .. }
+                | Error::Data(elm_datasets::Error::UnknownFormat { .. }) => usage(format!(
+                    "--exact resamples a table, and {name} is none: expected a MERL .binary or an \
+                         RGL .bsdf file"
+                )),
+                error => error.into(),
+            });
+        }
+        let Some(samples) = samples else {
+            let model: BrdfModel = file::load(Path::new(&self.model))?;
+            return Ok(Box::new(model.in_rgb_order()?));
+        };
+        let material = self.reading.read(samples)?;
+        let (source, samples) = (material.source, material.samples.in_rgb_order());
+        let pairs = &samples.directions;
+        let fitted = recipes::network(None).fit(pairs, samples.values.view())?;
+        let Some(model) = BrdfModel::of(&*fitted) else {
+            return Ok(fitted);
+        };
+        let mut about = model.provenance().clone();
+        about.data = source;
+        about.channels = samples.channels;
+        Ok(Box::new(model.clone().with_provenance(about)))
     }
 }

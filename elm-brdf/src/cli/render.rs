@@ -13,24 +13,25 @@ use crate::error::Error;
 use crate::file;
 use crate::render::scene::Image;
 use crate::render::{Optimizations, Options, RenderStats, Rendering};
-use crate::scene_materials::{Scene, Sheet};
+use crate::scene_materials::{MaterialTable, Scene, Sheet};
 use crate::scenes::builtin;
 
 /// Render a scene with learnt materials.
 ///
-/// SCENE is a TOML file or a built-in scene: builtin:materials, builtin:contact-sheet,
-/// builtin:comparison or builtin:mesh. Measurements are looked for as by 'reproduce'; without
+/// SCENE is a TOML file, a built-in scene (builtin:materials, builtin:contact-sheet,
+/// builtin:comparison or builtin:mesh), or a file of one's own, which builtin:mesh then shows: a saved
+/// model, measurements, or a measured table (MERL, RGL). Measurements of CUReT are looked for as by 'reproduce'; without
 /// CUReT's files its materials come from the built-in synthetic data, and the caption says so.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// TOML file, or builtin:NAME.
+    /// TOML file, builtin:NAME, or a material's file.
     scene: String,
     /// The picture: .png (sRGB, with captions) or .exr (linear radiance).
     #[arg(short, long, value_name = "IMAGE")]
     output: PathBuf,
     #[command(flatten)]
     folder: DataFolder,
-    /// For a built-in scene, the material by CUReT's number or name.
+    /// For a built-in scene, the material: a file, or CUReT's number or name.
     #[arg(long, value_name = "NAME")]
     material: Option<String>,
     /// Pixels across and down, such as 640x360, instead of the scene's.
@@ -63,6 +64,9 @@ pub(super) struct Arguments {
     without: Vec<String>,
 }
 
+/// The built-in scene that shows the material of a file.
+const PREVIEW: &str = "mesh";
+
 /// Reads WIDTHxHEIGHT.
 fn size(text: &str) -> Result<(u32, u32), String> {
     let parts = text
@@ -75,11 +79,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let format =
         Rendering::format(&arguments.output).map_err(|error| Failure::Usage(error.to_string()))?;
     let mut sheet = match arguments.scene.strip_prefix("builtin:") {
-        Some(name) => builtin(name, arguments.material.as_deref())
-            .map_err(|e| Failure::Usage(e.to_string()))?,
-        None => Scene::read(Path::new(&arguments.scene))
-            .map_err(Error::from)?
-            .into(),
+        Some(name) => {
+            let material = arguments.material.as_deref().map(material).transpose()?;
+            builtin(name, material.as_ref()).map_err(|e| Failure::Usage(e.to_string()))?
+        }
+        None => arguments.scene_file()?,
     };
     arguments.amend(&mut sheet);
     let mut inputs = Vec::new();
@@ -112,7 +116,37 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
+/// The material that an option names.
+fn material(name: &str) -> Result<MaterialTable, Failure> {
+    let path = Path::new(name);
+    if path.is_file() {
+        return Ok(MaterialTable::of_file(path)?);
+    }
+    Ok(MaterialTable {
+        curet: Some(name.to_owned()),
+        ..MaterialTable::default()
+    })
+}
+
 impl Arguments {
+    /// A scene's file, or the built-in scene that shows the material of a file.
+    fn scene_file(&self) -> Result<Sheet, Failure> {
+        let path = Path::new(&self.scene);
+        let is_scene = path
+            .extension()
+            .is_some_and(|end| end.eq_ignore_ascii_case("toml"));
+        if is_scene || !path.is_file() {
+            return Ok(Scene::read(path).map_err(Error::from)?.into());
+        }
+        if self.material.is_some() {
+            return Err(Failure::Usage(
+                "--material is for built-in scenes: expected a scene before it".to_owned(),
+            ));
+        }
+        let material = MaterialTable::of_file(path)?;
+        Ok(builtin(PREVIEW, Some(&material)).map_err(Error::from)?)
+    }
+
     /// Puts what was typed in place of what the scene says.
     fn amend(&self, sheet: &mut Sheet) {
         if let Some((width, height)) = self.size {
