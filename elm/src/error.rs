@@ -86,6 +86,15 @@ pub enum Error {
         /// The fold's label; for leave-one-out the row, counted from 0.
         fold: usize,
     },
+    /// All rows of positive weight are of one class.
+    #[error("all rows are of one class: a classifier needs rows of at least two classes")]
+    OneClass,
+    /// A label that is none of the classes.
+    #[error("the label of row {row} (counted from 0) is none of the classes")]
+    UnknownClass {
+        /// The first such row.
+        row: usize,
+    },
     /// Two accumulators that are to be merged are not of one kind.
     #[error("the accumulators have different {what}")]
     Mismatch {

@@ -1,4 +1,4 @@
-//! Extreme learning machines: regression by a hidden layer of random neurons and one linear
+//! Extreme learning machines: regression and classification by a hidden layer of random neurons and one linear
 //! solve.
 //!
 //! A network with one hidden layer computes $o(x) = \sum_k \beta_k f(\omega_k \cdot x + b_k)$.
@@ -31,7 +31,8 @@
 //! - [`prune`] keeps the most useful of many neurons.
 //! - [`tune`] chooses scale, neurons and inputs; [`uncertainty`] says how far a prediction can be
 //!   trusted; [`persist`] keeps a network in a file.
-//! - [`metrics`] has RMSE, MAE, $R^2$ and correlation.
+//! - [`classify`] makes classifiers with calibrated probabilities of the same settings.
+//! - [`metrics`] has RMSE, MAE, $R^2$ and correlation; of classes accuracy, log loss and others.
 //! - [`advanced`] has the parts of a network, [`ndarray`] is the version that this crate is built with.
 //!
 //! Everything is generic over [`Scalar`], `f32` or `f64`. No input makes the public API panic:
@@ -48,6 +49,7 @@
 //!   thread for the whole process: its parallel routines overflow the stack of a Rust thread.
 //! - `persist` (default): files, [`persist`].
 //! - `serde`: settings, networks and what they consist of in any format of serde; part of `persist`.
+//! - `onnx`: networks and classifiers as ONNX files, `elm::onnx`.
 //! - `rayon`: several threads where a call asks for them, `Predictor::predict_into_parallel` and
 //!   `ElmParams::fit_chunks_parallel`.
 
@@ -56,6 +58,7 @@ pub mod activation;
 pub mod advanced;
 pub mod bounds;
 mod check;
+pub mod classify;
 pub mod cross_validation;
 mod dataset;
 mod error;
@@ -67,6 +70,8 @@ mod model;
 mod network;
 #[cfg(feature = "serde")]
 mod numbers;
+#[cfg(feature = "onnx")]
+pub mod onnx;
 #[cfg(feature = "persist")]
 pub mod persist;
 mod predictor;
@@ -82,6 +87,7 @@ pub mod uncertainty;
 pub use accumulate::Accumulator;
 pub use activation::{Accuracy, Activation};
 pub use bounds::Bounds;
+pub use classify::ElmClassifier;
 pub use dataset::{Dataset, Inputs, TargetDim, Targets};
 pub use error::{Error, Result};
 pub use feature_map::{Biases, Distribution, NeuronGroup, NodeType, Scaler, ScalerBuilder};

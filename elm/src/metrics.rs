@@ -17,6 +17,11 @@
 //! assert_eq!(rmse(&predicted, &truth)?, array![0.0, 1.0]);
 //! # Ok::<(), elm::Error>(())
 //! ```
+//!
+//! Of classes: [`accuracy`], [`balanced_accuracy`] and [`confusion_matrix`] of predicted labels;
+//! [`log_loss`], [`brier_score`], [`roc_auc`] and [`calibration_error`] of probabilities.
+
+mod classes;
 
 use ndarray::{Array1, ArrayView1, ArrayView2, Axis};
 
@@ -25,6 +30,10 @@ use crate::dataset::{TargetDim, Targets, matrix};
 use crate::error::{Error, Result};
 use crate::scalar::{Scalar, power_of_two};
 use crate::stats::{Sum, sum};
+pub use classes::{
+    accuracy, balanced_accuracy, brier_score, calibration_error, confusion_matrix, log_loss,
+    roc_auc,
+};
 
 /// Root mean squared error.
 ///

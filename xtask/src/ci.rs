@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use crate::Result;
 use crate::package::Packaging;
+use crate::python::python;
 use crate::run::{command, run, say, test};
 use crate::tiers::{Tiers, has_data};
 
@@ -36,7 +37,7 @@ fn tools() -> Result {
     run_if_installed("cargo-deny", "cargo-deny check bans licenses sources")?;
     run_if_installed("cargo-machete", "cargo-machete")?;
     for features in [
-        "-p elm-learn --features rayon",
+        "-p elm-learn --features rayon,onnx",
         "-p elm-learn --no-default-features --features faer",
         "-p elm-brdf --no-default-features --features faer",
     ] {
@@ -103,6 +104,9 @@ pub(crate) fn all() -> Result {
 
     step("spelling, dependencies, features, the oldest compiler");
     tools()?;
+
+    step("the Python package: wheel, fresh environment, tests");
+    python()?;
 
     step("packages");
     Packaging::contents().run()?;

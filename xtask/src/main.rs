@@ -6,6 +6,7 @@
 
 mod ci;
 mod package;
+mod python;
 mod run;
 mod tables;
 mod tiers;
@@ -33,6 +34,8 @@ enum Command {
     Test(tiers::Tiers),
     /// Everything that must hold before a change lands; `.ci/run` installs what it needs first.
     Ci,
+    /// The Python package: its wheel, installed into a fresh environment, and its tests.
+    Python,
     /// Lists the commands that write the tables of docs/reports/, or runs some of them.
     Tables(tables::Selection),
     /// The packages as they would be published, in publishing order, each built from its package.
@@ -44,6 +47,7 @@ fn main() -> ExitCode {
         Command::Check => ci::check(),
         Command::Test(tiers) => tiers.run(),
         Command::Ci => ci::all(),
+        Command::Python => python::python(),
         Command::Tables(selection) => selection.run(),
         Command::Package(packaging) => packaging.run(),
     };

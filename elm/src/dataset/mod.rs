@@ -76,6 +76,16 @@ impl<'a, A: Scalar, D: TargetDim> Dataset<'a, A, D> {
         })
     }
 
+    /// Of arrays that have been checked.
+    pub(crate) fn of_views(inputs: ArrayView2<'a, A>, targets: ArrayView<'a, A, D>) -> Self {
+        Self {
+            inputs,
+            targets,
+            weights: None,
+            groups: None,
+        }
+    }
+
     /// A weight for the squared residual of each row.
     ///
     /// # Errors

@@ -8,6 +8,7 @@ mod accumulate;
 mod accumulate_deficient;
 mod bad_input;
 mod bounds;
+mod classify;
 mod common;
 mod csv_example;
 mod dataset;

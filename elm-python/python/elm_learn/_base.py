@@ -1,0 +1,176 @@
+"""What both estimators share: parameters, threads, interrupts, files."""
+
+from __future__ import annotations
+
+import os
+import threading
+from numbers import Integral, Real
+
+import numpy as np
+from sklearn.base import BaseEstimator
+from sklearn.utils import check_random_state
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from ._elm_learn import Settings
+
+#: Neurons of ``partial_fit`` where their number is to be chosen.
+PARTIAL_NEURONS = 200
+#: Multiply-adds from which a fit runs where Ctrl-C can end the wait for it.
+LONG = 2e9
+FLOATS = (np.float64, np.float32)
+
+
+class ElmBase(BaseEstimator):
+    """Parameters and files of the estimators."""
+
+    def _settings(self, partial: bool = False) -> Settings:
+        neurons = self.n_neurons
+        if neurons == "auto":
+            for name, given, free in (
+                ("activation", self.activation, "tanh"),
+                ("scale", self.scale, "auto"),
+                ("alpha", self.alpha, "loo"),
+                ("direct_links", self.direct_links, False),
+            ):
+                if given != free and not partial:
+                    raise ValueError(
+                        f"{name}={given!r} and n_neurons='auto', which chooses it, exclude each "
+                        "other: give a number of neurons"
+                    )
+            neurons = PARTIAL_NEURONS if partial else None
+        elif not isinstance(neurons, Integral) or isinstance(neurons, bool) or neurons < 1:
+            raise ValueError(f"n_neurons must be 'auto' or at least 1, got {neurons!r}")
+        if self.scale == "auto":
+            scale = 1.0
+        elif self.scale == "loo":
+            scale = 1.0 if partial else None
+        elif isinstance(self.scale, Real) and self.scale > 0:
+            scale = float(self.scale)
+        else:
+            raise ValueError(f"scale must be 'auto', 'loo' or positive, got {self.scale!r}")
+        if self.alpha in ("loo", "gcv"):
+            alpha = self.alpha
+        elif isinstance(self.alpha, Real) and self.alpha > 0:
+            alpha = repr(float(self.alpha))
+        else:
+            raise ValueError(f"alpha must be 'loo', 'gcv' or positive, got {self.alpha!r}")
+        seed = self.random_state
+        if not isinstance(seed, Integral):
+            seed = check_random_state(seed).randint(2**31)
+        neurons = None if neurons is None else int(neurons)
+        return Settings(
+            neurons, self.activation, scale, alpha, bool(self.direct_links), int(seed)
+        )
+
+    def _threads(self) -> int:
+        jobs = 1 if self.n_jobs is None else int(self.n_jobs)
+        if jobs == 0:
+            raise ValueError("n_jobs == 0 has no meaning")
+        if jobs > 0:
+            return jobs
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+        return max(1, (cores or 1) + 1 + jobs)
+
+    def _inputs(self, X):
+        """Inputs to predict for, of the type of the model."""
+        check_is_fitted(self)
+        return validate_data(self, X, reset=False, dtype=self._fitted().dtype)
+
+    def _fitted(self):
+        """The fitted network; after ``partial_fit`` it is solved for when it is first needed."""
+        if self._network is None:
+            self._network = self._rows.fit()
+        return self._network
+
+    def _work(self, X) -> float:
+        if self.n_neurons == "auto" or self.scale == "loo":
+            return float("inf")
+        return X.shape[0] * float(self.n_neurons) ** 2
+
+    def _describe(self, network) -> None:
+        """What a fit found, as attributes."""
+        self.n_neurons_ = network.neurons
+        self.alpha_ = np.asarray(network.alpha)
+        left_out = network.leave_one_out
+        self.loo_rmse_ = None if left_out is None else np.asarray(left_out)
+
+    @property
+    def feature_importances_(self):
+        """Scales of the inputs that ``n_neurons="auto"`` chose by held-out error, 1 in sum.
+
+        For a model of given settings take :func:`sklearn.inspection.permutation_importance`.
+
+        Returns
+        -------
+        ndarray of shape (n_features,)
+        """
+        check_is_fitted(self)
+        if self._importances is None:
+            raise AttributeError(
+                "feature_importances_ are known where n_neurons='auto' has chosen scales of inputs; "
+                "take sklearn.inspection.permutation_importance"
+            )
+        return self._importances
+
+    def _set_importances(self, network) -> None:
+        self._importances = None
+        if self.n_neurons == "auto":
+            scales = np.asarray(network.input_scales, dtype=float)
+            if scales.size == 0:
+                scales = np.ones(self.n_features_in_)
+            self._importances = scales / scales.sum()
+
+    def to_onnx(self, path, double: bool = False) -> None:
+        """Write the model as an ONNX graph.
+
+        Parameters
+        ----------
+        path : path-like
+            The file. A regressor has the output ``y`` of shape (rows, outputs), a classifier ``label``, the
+            index of the class in ``classes_``, and ``probabilities`` of shape (rows, classes).
+        double : bool, default=False
+            Whether inputs and outputs are float64, else float32. All between is float64.
+        """
+        check_is_fitted(self)
+        graph = self._fitted().to_onnx(double)
+        with open(path, "wb") as file:
+            file.write(graph)
+
+    def __getstate__(self):
+        state = dict(super().__getstate__())
+        for name in ("_network", "_rows"):
+            if state.get(name) is not None:
+                state[name] = state[name].to_bytes()
+        return state
+
+    def __setstate__(self, state):
+        state = dict(state)
+        for name, kind in (("_network", self._NETWORK), ("_rows", self._ROWS)):
+            if state.get(name) is not None:
+                state[name] = kind.from_bytes(state[name])
+        super().__setstate__(state)
+
+
+def interruptible(work: float, function, *arguments):
+    """Call a function that does not run Python code; Ctrl-C ends the wait for a long one.
+
+    The thread behind an interrupted call ends by itself when its fit is done; its result is dropped.
+    """
+    if work < LONG or threading.current_thread() is not threading.main_thread():
+        return function(*arguments)
+    outcome = []
+
+    def run():
+        try:
+            outcome.append((function(*arguments), None))
+        except BaseException as error:  # passed on below
+            outcome.append((None, error))
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    while thread.is_alive():
+        thread.join(0.05)
+    result, error = outcome[0]
+    if error is not None:
+        raise error
+    return result

@@ -1,0 +1,352 @@
+//! Networks for regression, and what rows in pieces make of them.
+
+use std::sync::OnceLock;
+
+use elm::persist::{self, Persist};
+use elm::uncertainty::UncertainElm;
+use elm::{Accumulator, Dataset, Elm, Predictor, Scalar, onnx};
+use ndarray::{Array2, ArrayView1, ArrayView2, Ix2};
+use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::pool::pool;
+use crate::settings::{Recipe, Settings, error};
+
+/// A network with its weights packed on first use.
+pub(crate) struct Packed<A: Scalar> {
+    model: Elm<A>,
+    predictor: OnceLock<Predictor<A>>,
+    /// What intervals need; not in files.
+    uncertain: Option<UncertainElm<A>>,
+    input_scales: Vec<f64>,
+}
+
+impl<A: Scalar> Packed<A> {
+    fn of(model: Elm<A>) -> Self {
+        Self {
+            model,
+            predictor: OnceLock::new(),
+            uncertain: None,
+            input_scales: Vec::new(),
+        }
+    }
+
+    fn predict(&self, x: ArrayView2<'_, A>, threads: usize) -> PyResult<Array2<A>> {
+        let predictor = self.predictor.get_or_init(|| self.model.predictor());
+        let Some(pool) = pool(threads)? else {
+            return predictor.predict(&x).map_err(error);
+        };
+        let mut out = Array2::zeros((x.nrows(), self.model.outputs()));
+        pool.install(|| predictor.predict_into_parallel(&x, &mut out))
+            .map_err(error)?;
+        Ok(out)
+    }
+}
+
+fn fit<A: Scalar>(
+    settings: &Settings,
+    x: ArrayView2<'_, A>,
+    y: ArrayView2<'_, A>,
+    weights: Option<ArrayView1<'_, A>>,
+    intervals: bool,
+) -> PyResult<Packed<A>> {
+    let mut data: Dataset<'_, A, Ix2> = Dataset::new(&x, &y).map_err(error)?;
+    if let Some(weights) = &weights {
+        data = data.with_weights(weights).map_err(error)?;
+    }
+    let (model, params) = match settings.recipe()? {
+        Recipe::Given(params) => (params.fit_dataset(&data).map_err(error)?, params),
+        Recipe::Search(tuner) => {
+            let tuned = tuner.tune(&data).map_err(error)?;
+            (tuned.model, tuned.params)
+        }
+    };
+    let mut packed = Packed::of(model);
+    packed.input_scales = params.input_scales().to_vec();
+    if intervals {
+        packed.uncertain = Some(params.fit_uncertain(&data).map_err(error)?);
+    }
+    Ok(packed)
+}
+
+enum Kind {
+    F32(Packed<f32>),
+    F64(Packed<f64>),
+}
+
+/// A fitted network.
+#[pyclass(frozen, module = "elm_learn._elm_learn")]
+pub(crate) struct Network {
+    kind: Kind,
+}
+
+/// Evaluates an expression for either type.
+macro_rules! either {
+    ($kind:expr, $model:ident => $value:expr) => {
+        match $kind {
+            Kind::F32($model) => $value,
+            Kind::F64($model) => $value,
+        }
+    };
+}
+
+/// Reads a file of either scalar type.
+pub(crate) fn load<S: Persist, D: Persist>(bytes: &[u8]) -> PyResult<Result<S, D>> {
+    match persist::from_bytes::<D>(bytes) {
+        Ok(double) => Ok(Err(double)),
+        Err(persist::Error::ScalarType { .. }) => {
+            persist::from_bytes::<S>(bytes).map(Ok).map_err(error)
+        }
+        Err(reason) => Err(error(reason)),
+    }
+}
+
+#[pymethods]
+impl Network {
+    /// Fits to arrays of one type, all of `float32` or `float64`, shapes (rows, inputs) and (rows, outputs).
+    #[staticmethod]
+    #[pyo3(signature = (settings, x, y, weights=None, intervals=false))]
+    fn fit(
+        py: Python<'_>,
+        settings: &Settings,
+        x: &Bound<'_, PyAny>,
+        y: &Bound<'_, PyAny>,
+        weights: Option<&Bound<'_, PyAny>>,
+        intervals: bool,
+    ) -> PyResult<Self> {
+        let kind = if let Ok(x) = x.extract::<PyReadonlyArray2<'_, f64>>() {
+            let y = y.extract::<PyReadonlyArray2<'_, f64>>()?;
+            let w: Option<PyReadonlyArray1<'_, f64>> = weights.map(|w| w.extract()).transpose()?;
+            let (x, y, w) = (x.as_array(), y.as_array(), w.as_ref().map(|w| w.as_array()));
+            Kind::F64(py.detach(|| fit(settings, x, y, w, intervals))?)
+        } else {
+            let x = x.extract::<PyReadonlyArray2<'_, f32>>()?;
+            let y = y.extract::<PyReadonlyArray2<'_, f32>>()?;
+            let w: Option<PyReadonlyArray1<'_, f32>> = weights.map(|w| w.extract()).transpose()?;
+            let (x, y, w) = (x.as_array(), y.as_array(), w.as_ref().map(|w| w.as_array()));
+            Kind::F32(py.detach(|| fit(settings, x, y, w, intervals))?)
+        };
+        Ok(Self { kind })
+    }
+
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        x: &Bound<'py, PyAny>,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        match &self.kind {
+            Kind::F64(model) => {
+                let x = x.extract::<PyReadonlyArray2<'_, f64>>()?;
+                let x = x.as_array();
+                let y = py.detach(|| model.predict(x, threads))?;
+                Ok(y.into_pyarray(py).into_any())
+            }
+            Kind::F32(model) => {
+                let x = x.extract::<PyReadonlyArray2<'_, f32>>()?;
+                let x = x.as_array();
+                let y = py.detach(|| model.predict(x, threads))?;
+                Ok(y.into_pyarray(py).into_any())
+            }
+        }
+    }
+
+    /// Lower and upper ends, shape (rows, outputs) each.
+    fn predict_interval<'py>(
+        &self,
+        py: Python<'py>,
+        x: &Bound<'py, PyAny>,
+        coverage: f64,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        match &self.kind {
+            Kind::F64(Packed {
+                uncertain: Some(model),
+                ..
+            }) => {
+                let x = x.extract::<PyReadonlyArray2<'_, f64>>()?;
+                let x = x.as_array();
+                let ends = py.detach(|| model.predict_interval(&x, coverage));
+                let (low, high) = ends.map_err(error)?;
+                Ok((
+                    low.into_pyarray(py).into_any(),
+                    high.into_pyarray(py).into_any(),
+                ))
+            }
+            Kind::F32(Packed {
+                uncertain: Some(model),
+                ..
+            }) => {
+                let x = x.extract::<PyReadonlyArray2<'_, f32>>()?;
+                let x = x.as_array();
+                let ends = py.detach(|| model.predict_interval(&x, coverage));
+                let (low, high) = ends.map_err(error)?;
+                Ok((
+                    low.into_pyarray(py).into_any(),
+                    high.into_pyarray(py).into_any(),
+                ))
+            }
+            _ => Err(PyTypeError::new_err("fitted without intervals")),
+        }
+    }
+
+    /// Standard deviation of a new observation, shape (rows, outputs).
+    fn predict_deviation<'py>(
+        &self,
+        py: Python<'py>,
+        x: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        match &self.kind {
+            Kind::F64(Packed {
+                uncertain: Some(model),
+                ..
+            }) => {
+                let x = x.extract::<PyReadonlyArray2<'_, f64>>()?;
+                let x = x.as_array();
+                let sd = py.detach(|| model.predict_deviation(&x)).map_err(error)?;
+                Ok(sd.into_pyarray(py).into_any())
+            }
+            Kind::F32(Packed {
+                uncertain: Some(model),
+                ..
+            }) => {
+                let x = x.extract::<PyReadonlyArray2<'_, f32>>()?;
+                let x = x.as_array();
+                let sd = py.detach(|| model.predict_deviation(&x)).map_err(error)?;
+                Ok(sd.into_pyarray(py).into_any())
+            }
+            _ => Err(PyTypeError::new_err("fitted without intervals")),
+        }
+    }
+
+    #[getter]
+    fn has_intervals(&self) -> bool {
+        either!(&self.kind, model => model.uncertain.is_some())
+    }
+
+    /// Leave-one-out RMSE of each output, where the solver knows it.
+    #[getter]
+    fn leave_one_out(&self) -> Option<Vec<f64>> {
+        either!(&self.kind, model => model.model.diagnosis().leave_one_out.clone())
+    }
+
+    /// The strength of ridge of each output.
+    #[getter]
+    fn alpha(&self) -> Vec<f64> {
+        either!(&self.kind, model => model.model.diagnosis().lambda.clone())
+    }
+
+    #[getter]
+    fn neurons(&self) -> usize {
+        either!(&self.kind, model => model.model.hidden().neurons())
+    }
+
+    /// The scales of inputs that a search found; empty where all are 1.
+    #[getter]
+    fn input_scales(&self) -> Vec<f64> {
+        either!(&self.kind, model => model.input_scales.clone())
+    }
+
+    #[getter]
+    fn dtype(&self) -> &'static str {
+        match &self.kind {
+            Kind::F32(_) => "float32",
+            Kind::F64(_) => "float64",
+        }
+    }
+
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = either!(&self.kind, model => persist::to_bytes(&model.model)).map_err(error)?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    #[staticmethod]
+    fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
+        let kind = match load::<Elm<f32>, Elm<f64>>(bytes)? {
+            Ok(single) => Kind::F32(Packed::of(single)),
+            Err(double) => Kind::F64(Packed::of(double)),
+        };
+        Ok(Self { kind })
+    }
+
+    fn to_onnx<'py>(&self, py: Python<'py>, double: bool) -> PyResult<Bound<'py, PyBytes>> {
+        let precision = precision(double);
+        let bytes = either!(&self.kind, model => onnx::network(&model.model, precision));
+        Ok(PyBytes::new(py, &bytes.map_err(error)?))
+    }
+}
+
+pub(crate) fn precision(double: bool) -> onnx::Precision {
+    if double {
+        onnx::Precision::Double
+    } else {
+        onnx::Precision::Single
+    }
+}
+
+/// Rows in pieces, in double precision.
+#[pyclass(module = "elm_learn._elm_learn")]
+pub(crate) struct Rows {
+    rows: Accumulator<f64>,
+}
+
+#[pymethods]
+impl Rows {
+    #[new]
+    fn new(
+        settings: &Settings,
+        sample: PyReadonlyArray2<'_, f64>,
+        outputs: usize,
+    ) -> PyResult<Self> {
+        let params = settings.params()?;
+        let rows = Accumulator::from_sample(&params, &sample.as_array(), outputs).map_err(error)?;
+        Ok(Self {
+            rows: rows.with_unlike_rows(true),
+        })
+    }
+
+    #[pyo3(signature = (x, y, weights=None))]
+    fn push(
+        &mut self,
+        py: Python<'_>,
+        x: PyReadonlyArray2<'_, f64>,
+        y: PyReadonlyArray2<'_, f64>,
+        weights: Option<PyReadonlyArray1<'_, f64>>,
+    ) -> PyResult<()> {
+        let (x, y, w) = (
+            x.as_array(),
+            y.as_array(),
+            weights.as_ref().map(|w| w.as_array()),
+        );
+        let rows = &mut self.rows;
+        py.detach(|| {
+            let mut data = Dataset::new(&x, &y)?;
+            if let Some(w) = &w {
+                data = data.with_weights(w)?;
+            }
+            rows.push_dataset(&data)
+        })
+        .map_err(error)
+    }
+
+    fn fit(&self, py: Python<'_>) -> PyResult<Network> {
+        let model = py.detach(|| self.rows.fit()).map_err(error)?;
+        Ok(Network {
+            kind: Kind::F64(Packed::of(model)),
+        })
+    }
+
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(
+            py,
+            &persist::to_bytes(&self.rows).map_err(error)?,
+        ))
+    }
+
+    #[staticmethod]
+    fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
+        let rows = persist::from_bytes(bytes).map_err(error)?;
+        Ok(Self { rows })
+    }
+}
