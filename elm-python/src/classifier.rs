@@ -86,7 +86,11 @@ fn fit<A: Scalar>(
         Recipe::Given(params) => Ok(Packed::of(params.fit_labeled(&rows).map_err(error)?)),
         Recipe::Search(tuner) => {
             let tuned = tuner.tune_classifier(&rows).map_err(error)?;
-            let mut packed = Packed::of(tuned.classifier);
+            let classifier = match settings.with_alpha(&tuned.params)? {
+                Some(params) => params.fit_labeled(&rows).map_err(error)?,
+                None => tuned.classifier,
+            };
+            let mut packed = Packed::of(classifier);
             packed.input_scales = tuned.params.input_scales().to_vec();
             Ok(packed)
         }

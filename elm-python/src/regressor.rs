@@ -60,7 +60,10 @@ fn fit<A: Scalar>(
         Recipe::Given(params) => (params.fit_dataset(&data).map_err(error)?, params),
         Recipe::Search(tuner) => {
             let tuned = tuner.tune(&data).map_err(error)?;
-            (tuned.model, tuned.params)
+            match settings.with_alpha(&tuned.params)? {
+                Some(params) => (params.fit_dataset(&data).map_err(error)?, params),
+                None => (tuned.model, tuned.params),
+            }
         }
     };
     let mut packed = Packed::of(model);

@@ -72,6 +72,18 @@ impl Settings {
         })
     }
 
+    /// What a search found, with the strength of ridge where that is given; nothing where a search has
+    /// chosen that as well.
+    pub(crate) fn with_alpha<A: Scalar>(
+        &self,
+        found: &ElmParams<A>,
+    ) -> PyResult<Option<ElmParams<A>>> {
+        if self.alpha == "loo" {
+            return Ok(None);
+        }
+        Ok(Some(found.clone().with_solver(self.solver()?)))
+    }
+
     fn solver(&self) -> PyResult<Solver> {
         Ok(match self.alpha.as_str() {
             "loo" => Ridge::leave_one_out().into(),

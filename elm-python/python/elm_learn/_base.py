@@ -29,7 +29,6 @@ class ElmBase(BaseEstimator):
             for name, given, free in (
                 ("activation", self.activation, "tanh"),
                 ("scale", self.scale, "auto"),
-                ("alpha", self.alpha, "loo"),
                 ("direct_links", self.direct_links, False),
             ):
                 if given != free and not partial:

@@ -26,7 +26,7 @@ class ElmClassifier(ClassifierMixin, ElmBase):
     ----------
     n_neurons : int or "auto", default="auto"
         Number of hidden neurons. "auto" chooses neurons, scale of the random weights, a scale for each
-        input, direct links and regularization by leave-one-out errors.
+        input, direct links and, unless `alpha` is given, regularization by leave-one-out errors.
     activation : str, default="tanh"
         One of "sigmoid", "tanh", "sine", "gaussian", "relu", "squared-relu", "hard-limit", "isru",
         "linear".
@@ -155,7 +155,7 @@ class ElmClassifier(ClassifierMixin, ElmBase):
         y : array-like of shape (n_samples,)
             Labels; some classes may be missing.
         classes : array-like of shape (n_classes,), default=None
-            All classes; needed at the first call.
+            All classes; needed at the first call, unless there was a fit before it.
         sample_weight : array-like of shape (n_samples,), default=None
             What each row counts for.
 
@@ -168,6 +168,9 @@ class ElmClassifier(ClassifierMixin, ElmBase):
         check_classification_targets(y)
         y = column_or_1d(y, warn=True)
         if first:
+            if classes is None:
+                # After a fit, as scikit-learn's own classifiers have it.
+                classes = getattr(self, "classes_", None)
             if classes is None:
                 raise ValueError("classes must be passed on the first call to partial_fit")
             if isinstance(self.class_weight, str):

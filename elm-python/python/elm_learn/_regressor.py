@@ -19,7 +19,7 @@ class ElmRegressor(RegressorMixin, ElmBase):
     ----------
     n_neurons : int or "auto", default="auto"
         Number of hidden neurons. "auto" chooses neurons, scale of the random weights, a scale for each
-        input, direct links and regularization by leave-one-out errors.
+        input, direct links and, unless `alpha` is given, regularization by leave-one-out errors.
     activation : str, default="tanh"
         One of "sigmoid", "tanh", "sine", "gaussian", "relu", "squared-relu", "hard-limit", "isru",
         "linear".
