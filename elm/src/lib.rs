@@ -1,5 +1,5 @@
-//! Extreme learning machines: regression and classification by a hidden layer of random neurons and one linear
-//! solve.
+//! Extreme learning machines: regression and classification by a hidden layer of random neurons and one
+//! linear solve.
 //!
 //! A network with one hidden layer computes $o(x) = \sum_k \beta_k f(\omega_k \cdot x + b_k)$.
 //! An extreme learning machine draws $\omega$ and $b$ at random, never trains them, and finds the

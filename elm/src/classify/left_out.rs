@@ -27,8 +27,8 @@ pub(super) struct LeftOut {
 }
 
 impl LeftOut {
-    /// Scores of all rows, or evenly spread ones of many, for a network that was fitted to them by ridge of one
-    /// strength for all outputs. A row of weight above 1 loses one unit of it, so that a row of weight 2
+    /// Scores of all rows, or evenly spread ones of many, for a network that was fitted to them by ridge of
+    /// one strength for all outputs. A row of weight above 1 loses one unit of it, so that a row of weight 2
     /// is two rows.
     ///
     /// The residual without a row is $r / (1 - h)$, the leverage $h$ by the Cholesky factor of

@@ -55,8 +55,8 @@ use crate::error::{Error, Result};
 use crate::network::Elm;
 use crate::scalar::Scalar;
 
-/// A fitted classifier: a network with a score for each class (of two classes, for the second), and what makes
-/// probabilities of scores. Made by [`ElmParams::fit_classifier`](crate::ElmParams::fit_classifier).
+/// A fitted classifier: a network with a score for each class (of two classes, for the second), and what
+/// makes probabilities of scores. Made by [`ElmParams::fit_classifier`](crate::ElmParams::fit_classifier).
 ///
 /// `L` is the type of labels: numbers, texts, an enum of your own. Equal settings and seeds give the same
 /// classifier whatever labels are called, as classes are numbered in their order.

@@ -164,9 +164,9 @@ fn area<A: Scalar>(p: ArrayView1<'_, A>, codes: &[usize], class: usize) -> Optio
     (pairs > 0.0).then(|| (ranks - own * (own + 1.0) / 2.0) / pairs)
 }
 
-/// The expected calibration error (Naeini, Cooper and Hauskrecht, 2015): rows are put into `bins` equal bins by
-/// the probability of their most probable class; the mean over rows of the difference, in their bin, between
-/// that probability and the share that is right.
+/// The expected calibration error (Naeini, Cooper and Hauskrecht, 2015): rows are put into `bins` equal bins
+/// by the probability of their most probable class; the mean over rows of the difference, in their bin,
+/// between that probability and the share that is right.
 ///
 /// # Errors
 /// Those of [`log_loss`]; [`Error::Parameter`] for no bins.
