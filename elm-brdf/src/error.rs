@@ -125,14 +125,17 @@ pub enum Error {
         found: f64,
     },
     /// A model with a number of channels that is no colour.
-    #[error("a model of {channels} channels cannot be rendered: expected 1 or 3")]
+    #[error(
+        "a model of {channels} channels has no color: expected 1, 3 or at least 4 that are wavelengths, such as \
+         '550 nm' (or --wavelengths)"
+    )]
     Channels {
         /// Its channels.
         channels: usize,
     },
     /// Samples that lack a channel of the model, or have it twice.
     #[error(
-        "expected the channels of the samples to be those of the model, {model}, by name, colour or \
+        "expected the channels of the samples to be those of the model, {model}, by name, color or \
          wavelength; found {samples}"
     )]
     ChannelNames {

@@ -30,6 +30,7 @@
 
 pub mod albedo;
 pub mod baselines;
+mod basis;
 pub mod batch;
 #[cfg(feature = "cli")]
 pub mod cli;

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use elm_brdf_render::{LoadError, LoadedMaterial, MaterialLoader};
 use elm_datasets::Brdf;
 use elm_datasets::brdf::EvalError;
+use elm_datasets::color::{Colored, SpectralColor};
 use elm_datasets::geometry::DirectionPair;
 use elm_datasets::lobes::Formula;
 use elm_datasets::merl::Merl;
@@ -50,6 +51,9 @@ pub struct MaterialTable {
     /// Columns to leave out of one.
     #[serde(default)]
     pub ignore: Vec<String>,
+    /// Wavelengths in nm of one's channels, where their names do not say them.
+    #[serde(default)]
+    pub wavelengths: Vec<f64>,
     /// What to do with negative values in one: `clamp` (if not given), `keep` or `drop`.
     pub invalid: Option<String>,
     /// What is fitted to measurements: `elm` (if not given), `interpolation`, which passes through
@@ -59,7 +63,7 @@ pub struct MaterialTable {
     pub neurons: Option<usize>,
     /// A saved model.
     pub model: Option<PathBuf>,
-    /// A measured table, shown as it is: MERL `.binary`, or RGL `.bsdf` in red, green and blue.
+    /// A measured table, shown as it is: MERL `.binary` or RGL `.bsdf`.
     pub table: Option<PathBuf>,
     /// A formula: `lambert`, `oren-nayar`, `ward` or `ggx`.
     pub analytic: Option<String>,
@@ -121,14 +125,21 @@ impl MaterialTable {
     }
 }
 
-/// The table of a file, as it is.
+/// The table of a file, as it is; of a spectrum the [colors](elm_datasets::color).
 ///
 /// # Errors
 /// Those of [`Format::of`] and of the readers; [`Error::UnknownName`] for a file that is no table.
 pub fn measured_table(path: &Path) -> Result<Box<dyn Brdf>> {
     Ok(match Format::of(path)? {
         Format::Merl => Box::new(Merl::read(path)?),
-        Format::Rgl => Box::new(Rgl::read(path)?),
+        Format::Rgl => {
+            let table = Rgl::read(path)?;
+            let color = SpectralColor::of(&table.channels().names());
+            match color.map_err(elm_datasets::Error::from)? {
+                None => Box::new(table),
+                Some(color) => Box::new(Colored::new(table, color)),
+            }
+        }
         other => {
             return Err(Error::UnknownName {
                 what: "table",
@@ -225,7 +236,7 @@ impl SceneMaterialLoader {
                 Ok(Fitted {
                     origin: format!("{} ({})", file.display(), model.provenance().data),
                     name: None,
-                    model: Box::new(model.in_rgb_order()?),
+                    model: Box::new(model.in_color()?),
                     notes: Vec::new(),
                 })
             }
@@ -259,7 +270,22 @@ impl SceneMaterialLoader {
                 (boxed(family), format!("{name} fitted to"))
             }
         };
-        let model = method.fit(&samples.directions, samples.values.view())?;
+        let (samples, color) = (samples, SpectralColor::of(&samples.channels));
+        let model = match (
+            table.fit.as_deref(),
+            color.map_err(elm_datasets::Error::from)?,
+        ) {
+            // A network of all wavelengths has their colour.
+            (None | Some("elm"), Some(_)) => recipes::in_color(&*method, samples)?,
+            (_, Some(_)) => {
+                let samples = samples
+                    .clone()
+                    .in_color()
+                    .map_err(elm_datasets::Error::from)?;
+                method.fit(&samples.directions, samples.values.view())?
+            }
+            (_, None) => method.fit(&samples.directions, samples.values.view())?,
+        };
         Ok(Fitted {
             model,
             origin: format!("{how} {data}"),
@@ -495,6 +521,7 @@ fn read(path: &Path, material: &MaterialTable) -> Result<(Samples, Vec<String>)>
             channels: material.channels.clone(),
             ignore: material.ignore.clone(),
             scatter_cosine: weighted == Some("theta_o"),
+            wavelengths: material.wavelengths.clone(),
             ..scattered::Columns::default()
         },
         invalid,

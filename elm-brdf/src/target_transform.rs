@@ -28,7 +28,11 @@ use std::str::FromStr;
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
+mod spectral;
+
+use crate::basis::Basis;
 use crate::error::{Error, Result};
+use spectral::colors;
 
 /// The regression target made of a BRDF value $f$.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -91,6 +95,8 @@ impl TargetTransform {
         let channels = values.columns().into_iter();
         Ok(FittedTransform {
             channels: channels.map(|values| self.channel(values)).collect(),
+            basis: None,
+            color: None,
         })
     }
 
@@ -143,10 +149,15 @@ impl FromStr for TargetTransform {
     }
 }
 
-/// A [`TargetTransform`] that knows the scale of each channel.
+/// A [`TargetTransform`] that knows the scale of each channel; of many channels, what their targets have in common too,
+/// so that a network needs fewer outputs than there are channels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FittedTransform {
     channels: Vec<Channel>,
+    /// What the network's outputs are coordinates in; the targets themselves without one.
+    basis: Option<Basis>,
+    /// What each channel adds to red, green and blue, where the values are colours of these channels.
+    color: Option<Vec<[f64; 3]>>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -192,10 +203,17 @@ impl Channel {
 }
 
 impl FittedTransform {
-    /// Number of channels.
+    /// Number of channels of the values.
     #[must_use]
     pub fn channels(&self) -> usize {
-        self.channels.len()
+        self.color.as_ref().map_or(self.channels.len(), |_| 3)
+    }
+
+    /// Number of outputs of a network: of the targets.
+    #[must_use]
+    pub fn outputs(&self) -> usize {
+        let basis = self.basis.as_ref();
+        basis.map_or(self.channels.len(), Basis::outputs)
     }
 
     /// The transform of each channel.
@@ -208,6 +226,8 @@ impl FittedTransform {
         let channels = places.iter().filter_map(|&place| self.channels.get(place));
         Self {
             channels: channels.copied().collect(),
+            basis: None,
+            color: None,
         }
     }
 
@@ -224,6 +244,7 @@ impl FittedTransform {
                 expected,
             })
         };
+        self.check_shapes()?;
         for channel in &self.channels {
             let ceiling = match *channel {
                 Channel::Identity => continue,
@@ -279,7 +300,8 @@ impl FittedTransform {
         fitted: ArrayView2<'_, f64>,
         values: ArrayView2<'_, f64>,
     ) -> Result<Array2<f64>> {
-        let mut working = self.to_targets(values)?;
+        let fitted = self.in_channels(fitted);
+        let mut working = self.map(values.to_owned(), Channel::target)?;
         for ((mut working, fitted), (values, channel)) in working
             .columns_mut()
             .into_iter()
@@ -299,16 +321,23 @@ impl FittedTransform {
                 *working = fitted + residual.max(-2.0);
             }
         }
-        Ok(working)
+        Ok(self.project(working))
     }
 
-    /// Numbers kept for each channel.
+    /// Numbers kept for each channel alone.
     pub(crate) fn floats_per_channel(&self) -> usize {
-        match self.channels.first() {
+        let own = match self.channels.first() {
             None | Some(Channel::Identity) => 0,
             Some(Channel::CubeRoot { .. }) => 1,
             Some(Channel::Log { .. }) => 2,
-        }
+        };
+        let basis = self.basis.as_ref().map_or(0, |basis| 1 + basis.outputs());
+        own + basis + self.color.as_ref().map_or(0, |_| 3)
+    }
+
+    /// Numbers kept for all channels.
+    pub(crate) fn floats(&self) -> usize {
+        self.channels.len() * self.floats_per_channel()
     }
 
     /// Targets for BRDF values in 1/sr, shape (pairs, channels).
@@ -317,12 +346,19 @@ impl FittedTransform {
     /// the offset below 0.
     ///
     /// # Errors
-    /// [`Error::Shape`] for another number of channels than the transform was fitted to.
+    /// [`Error::Shape`] for another number of channels than the transform was fitted to; [`Error::Conflict`] where
+    /// values are colours, which no spectrum follows from.
     pub fn to_targets(&self, values: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
-        self.map(values.to_owned(), Channel::target)
+        if self.color.is_some() {
+            return Err(Error::Conflict {
+                first: "colours of a spectrum",
+                second: "targets of a fit",
+            });
+        }
+        Ok(self.project(self.map(values.to_owned(), Channel::target)?))
     }
 
-    /// BRDF values in 1/sr for predicted targets, shape (pairs, channels).
+    /// BRDF values in 1/sr for predicted targets, shape (pairs, outputs).
     ///
     /// Unless the transform is the identity they are not negative and at most
     /// [`TargetTransform::HEADROOM`] times the largest value that the transform was fitted to. A target that
@@ -331,16 +367,24 @@ impl FittedTransform {
     /// # Errors
     /// [`Error::Shape`] for another number of channels than the transform was fitted to.
     pub fn to_values(&self, targets: Array2<f64>) -> Result<Array2<f64>> {
-        self.map(targets, Channel::value)
+        if targets.ncols() != self.outputs() {
+            return Err(wrong_channels(self.outputs(), targets.ncols()));
+        }
+        self.values_of_channels(self.expand(targets))
+    }
+
+    /// BRDF values for the targets of all channels.
+    pub(crate) fn values_of_channels(&self, targets: Array2<f64>) -> Result<Array2<f64>> {
+        let values = self.map(targets, Channel::value)?;
+        Ok(match &self.color {
+            None => values,
+            Some(weights) => colors(&values, weights),
+        })
     }
 
     fn map(&self, mut matrix: Array2<f64>, f: fn(Channel, f64) -> f64) -> Result<Array2<f64>> {
         if matrix.ncols() != self.channels.len() {
-            return Err(Error::Shape {
-                what: "channels of the transform",
-                expected: self.channels.len(),
-                found: matrix.ncols(),
-            });
+            return Err(wrong_channels(self.channels.len(), matrix.ncols()));
         }
         for (mut column, &channel) in matrix.columns_mut().into_iter().zip(&self.channels) {
             column.mapv_inplace(|entry| f(channel, entry));
@@ -349,131 +393,13 @@ impl FittedTransform {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use approx::{assert_abs_diff_eq, assert_relative_eq};
-    use ndarray::array;
-    use proptest::prelude::*;
-
-    const LINKS: [TargetTransform; 3] = [
-        TargetTransform::Identity,
-        TargetTransform::Log { offset: 0.5 },
-        TargetTransform::CubeRoot,
-    ];
-
-    #[test]
-    fn targets_at_hand_computed_values() {
-        // Medians 2 (of 1, 2, 4; the 0 does not count) and 20.
-        let values = array![
-            [0.0, 10.0],
-            [1.0, 10.0],
-            [2.0, 20.0],
-            [4.0, 40.0],
-            [0.0, 40.0]
-        ];
-        let log = TargetTransform::Log { offset: 0.5 }
-            .fit(values.view())
-            .unwrap();
-        let targets = log.to_targets(values.view()).unwrap();
-        assert_abs_diff_eq!(
-            targets.column(0),
-            array![0.0, 2.0_f64.ln(), 3.0_f64.ln(), 5.0_f64.ln(), 0.0].view(),
-            epsilon = 1e-15
-        );
-        assert_abs_diff_eq!(targets[[3, 1]], 5.0_f64.ln(), epsilon = 1e-15);
-
-        let cube = TargetTransform::CubeRoot.fit(values.view()).unwrap();
-        let targets = cube.to_targets(array![[8.0, 0.027]].view()).unwrap();
-        assert_abs_diff_eq!(targets, array![[2.0, 0.3]], epsilon = 1e-15);
-    }
-
-    #[test]
-    fn no_target_gives_a_negative_or_unbounded_value() {
-        let values = array![[0.0], [1.0], [3.0]];
-        for transform in [TargetTransform::default_log(), TargetTransform::CubeRoot] {
-            let fitted = transform.fit(values.view()).unwrap();
-            let targets = array![[-1e300], [-1.0], [0.0], [1e9], [f64::INFINITY]];
-            let back = fitted.to_values(targets).unwrap();
-            let most = 3.0 * TargetTransform::HEADROOM;
-            let expected = array![[0.0], [0.0], [0.0], [most], [most]];
-            assert_eq!(back, expected, "{transform}");
-        }
-    }
-
-    #[test]
-    fn an_all_black_channel_stays_black() {
-        let values = Array2::zeros((4, 1));
-        for transform in LINKS {
-            let fitted = transform.fit(values.view()).unwrap();
-            let targets = fitted.to_targets(values.view()).unwrap();
-            assert_eq!(fitted.to_values(targets).unwrap(), values, "{transform}");
-        }
-    }
-
-    #[test]
-    fn the_log_resolves_a_metallic_paint_from_one_in_a_hundred_thousand_to_six_hundred() {
-        // Nine of ten values at 0.05 as a paint has, then extremes.
-        let mut values = Array2::from_elem((40, 1), 0.05);
-        values[[0, 0]] = 1e-5;
-        values[[1, 0]] = 600.0;
-        let fitted = TargetTransform::default_log().fit(values.view()).unwrap();
-        let targets = fitted.to_targets(values.view()).unwrap();
-        let back = fitted.to_values(targets.clone()).unwrap();
-        for (&value, &back) in values.iter().zip(&back) {
-            // A relative rounding of the target t = ln(1 + f/o) moves f by t (f + o) / f of
-            // them: 1 where f is far below o, and t <= ln(600 / 0.005) = 11.7 far above.
-            assert_relative_eq!(value, back, max_relative = 12.0 * f64::EPSILON);
-        }
-        // Errors of the target are relative errors of the large value.
-        let moved = fitted.to_values(targets + 1e-3).unwrap();
-        assert_relative_eq!(moved[[1, 0]] / 600.0, 1e-3_f64.exp(), max_relative = 1e-5);
-    }
-
-    #[test]
-    fn wrong_settings_and_shapes_are_refused() {
-        let values = array![[1.0, 2.0]];
-        for offset in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(TargetTransform::Log { offset }.fit(values.view()).is_err());
-        }
-        let fitted = TargetTransform::CubeRoot.fit(values.view()).unwrap();
-        assert!(fitted.to_targets(array![[1.0]].view()).is_err());
-        assert!(fitted.to_values(array![[1.0]]).is_err());
-    }
-
-    #[test]
-    fn names_are_read_back() {
-        for name in TargetTransform::NAMES {
-            assert_eq!(name.parse::<TargetTransform>().unwrap().name(), name);
-        }
-        assert!("square".parse::<TargetTransform>().is_err());
-    }
-
-    proptest! {
-        #[test]
-        fn values_survive_the_way_there_and_back(
-            values in proptest::collection::vec(
-                prop_oneof![Just(0.0), 1e-6..1.0_f64, 1.0..1e4_f64], 1..30),
-        ) {
-            let values = Array2::from_shape_vec((values.len(), 1), values).unwrap();
-            for transform in LINKS {
-                let fitted = transform.fit(values.view()).unwrap();
-                let back = fitted.to_values(fitted.to_targets(values.view()).unwrap()).unwrap();
-                for (&value, &back) in values.iter().zip(&back) {
-                    // ln(1 + f/o) stays below 25 here: so many roundings of the target.
-                    prop_assert!((value - back).abs() <= 30.0 * f64::EPSILON * value, "{}", transform);
-                }
-            }
-        }
-
-        #[test]
-        fn links_are_monotonic(low in 0.0..10.0_f64, step in 1e-3..10.0_f64, median in 1e-3..1e3_f64) {
-            let fitted_to = array![[median]];
-            for transform in LINKS {
-                let fitted = transform.fit(fitted_to.view()).unwrap();
-                let targets = fitted.to_targets(array![[low], [low + step]].view()).unwrap();
-                prop_assert!(targets[[0, 0]] < targets[[1, 0]], "{}", transform);
-            }
-        }
+fn wrong_channels(expected: usize, found: usize) -> Error {
+    Error::Shape {
+        what: "channels of the transform",
+        expected,
+        found,
     }
 }
+
+#[cfg(test)]
+mod tests;

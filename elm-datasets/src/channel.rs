@@ -2,6 +2,10 @@
 //!
 //! Channels of different files are matched by this, never by position.
 
+mod words;
+
+use words::{NO_VALUES, VALUES};
+
 /// What a channel is.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -13,121 +17,6 @@ pub enum Meaning {
     /// Anything else, in lower case.
     Other(String),
 }
-
-/// Words of names that are a value of reflectance.
-const VALUES: &[&str] = &[
-    "brdf",
-    "bsdf",
-    "brf",
-    "f",
-    "fr",
-    "value",
-    "values",
-    "val",
-    "reflectance",
-    "refl",
-    "rho",
-    "grey",
-    "gray",
-    "mono",
-    "luminance",
-    "lum",
-    "average",
-    "avg",
-    "mean",
-    "x",
-    "y",
-    "z",
-    "intensity",
-    "signal",
-    "radiance",
-    "measured",
-    "r",
-    "g",
-    "b",
-    "red",
-    "green",
-    "blue",
-    "rgb",
-];
-
-/// Words of names that are no reflectance: of errors, of row numbers, of settings.
-const NO_VALUES: &[&str] = &[
-    "std",
-    "stdev",
-    "stddev",
-    "sd",
-    "sigma",
-    "se",
-    "sem",
-    "error",
-    "err",
-    "errors",
-    "uncertainty",
-    "unc",
-    "uncert",
-    "deviation",
-    "dev",
-    "delta",
-    "variance",
-    "var",
-    "rms",
-    "rmse",
-    "snr",
-    "noise",
-    "tolerance",
-    "ci",
-    "lower",
-    "upper",
-    "row",
-    "rows",
-    "index",
-    "id",
-    "no",
-    "nr",
-    "num",
-    "number",
-    "count",
-    "n",
-    "line",
-    "sample",
-    "time",
-    "timestamp",
-    "date",
-    "seconds",
-    "temperature",
-    "temp",
-    "weight",
-    "weights",
-    "flag",
-    "flags",
-    "quality",
-    "valid",
-    "mask",
-    "pdf",
-    "theta",
-    "phi",
-    "dphi",
-    "azimuth",
-    "elevation",
-    "zenith",
-    "cos",
-    "cosine",
-    "angle",
-    "angles",
-    "deg",
-    "exposure",
-    "gain",
-    "dark",
-    "u",
-    "d",
-    "wavelength",
-    "wavelengths",
-    "lambda",
-    "wl",
-    "btdf",
-    "transmittance",
-];
 
 /// What the name of a column of a table says about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -264,6 +153,78 @@ pub fn rgb(channels: &[String]) -> Option<[usize; 3]> {
     order.sort_by(|&a, &b| lengths[b].total_cmp(&lengths[a]));
     (lengths[order[0]] > lengths[order[1]] && lengths[order[1]] > lengths[order[2]])
         .then_some(order)
+}
+
+/// Fewer wavelengths are no spectrum: three are taken for [red, green and blue](rgb).
+pub const SPECTRUM: usize = 4;
+
+/// The wavelengths in nm of channels that are a spectrum: at least [`SPECTRUM`] of them, each a wavelength
+/// and all different, with names that say nothing else or all the same beside it. `None` otherwise.
+///
+/// ```
+/// let names = ["400 nm", "500 nm", "600 nm", "700 nm"].map(str::to_owned);
+/// let found = elm_datasets::channel::spectrum(&names);
+/// assert_eq!(found, Some(vec![400.0, 500.0, 600.0, 700.0]));
+/// ```
+#[must_use]
+pub fn spectrum(channels: &[String]) -> Option<Vec<f64>> {
+    let mut first: Option<Vec<String>> = None;
+    let mut lengths = Vec::with_capacity(channels.len());
+    for name in channels {
+        let (nm, rest) = wavelength_and_rest(name)?;
+        if first.get_or_insert_with(|| rest.clone()) != &rest {
+            return None;
+        }
+        lengths.push(nm);
+    }
+    let mut sorted = lengths.clone();
+    sorted.sort_by(f64::total_cmp);
+    let different = sorted.windows(2).all(|two| two[0] < two[1]);
+    (channels.len() >= SPECTRUM && different).then_some(lengths)
+}
+
+/// Names for a line of text: those of a spectrum in short, and of others no more than eight.
+///
+/// ```
+/// let names: Vec<String> = (0..16).map(|k| format!("{} nm", 400 + 20 * k)).collect();
+/// assert_eq!(elm_datasets::channel::described(&names), "16 wavelengths from 400 to 700 nm");
+/// ```
+#[must_use]
+pub fn described(channels: &[String]) -> String {
+    const MOST: usize = 8;
+    if let Some(lengths) = spectrum(channels) {
+        let first = lengths.iter().copied().fold(f64::INFINITY, f64::min);
+        let last = lengths.iter().copied().fold(0.0, f64::max);
+        return format!("{} wavelengths from {first} to {last} nm", lengths.len());
+    }
+    match channels.get(..MOST) {
+        Some(some) if channels.len() > MOST => {
+            format!("{}, ... ({} in all)", some.join(", "), channels.len())
+        }
+        _ => channels.join(", "),
+    }
+}
+
+/// Two names of the same wavelength that say the same of it, if there are such.
+pub(crate) fn same_wavelength(names: &[&String]) -> Option<(usize, usize)> {
+    let mut known: Vec<(f64, Vec<String>, usize)> = names
+        .iter()
+        .enumerate()
+        .filter_map(|(place, name)| wavelength_and_rest(name).map(|(nm, rest)| (nm, rest, place)))
+        .collect();
+    known.sort_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)).then(a.2.cmp(&b.2)));
+    let same = known
+        .windows(2)
+        .find(|two| two[0].1 == two[1].1 && two[0].0 == two[1].0)?;
+    Some((same[0].2, same[1].2))
+}
+
+/// The wavelength that a name says, and what else it says.
+fn wavelength_and_rest(name: &str) -> Option<(f64, Vec<String>)> {
+    let words = words(name);
+    let nm = wavelength(&words)?;
+    let other = |word: &String| word.parse::<f64>().is_err() && !UNITS.contains(&word.as_str());
+    Some((nm, words.into_iter().filter(other).collect()))
 }
 
 /// What the name of a column says.
@@ -409,6 +370,28 @@ mod tests {
         }
         assert_eq!(Meaning::of("brdf_G"), Meaning::Primary(1));
         assert_eq!(Meaning::of("c1"), Meaning::Other("c1".to_owned()));
+    }
+
+    #[test]
+    fn a_spectrum_is_of_wavelengths_that_differ() {
+        let of = |list: &[&str]| spectrum(&names(list));
+        let expected = Some(vec![400.0, 500.0, 600.0, 700.0]);
+        assert_eq!(of(&["400 nm", "500nm", "600.0", "0.7 um"]), expected);
+        assert_eq!(of(&["R400", "R500", "R600", "R700"]), expected);
+        for none in [
+            &["400", "500", "600"][..],
+            &["400", "500", "600", "600 nm"],
+            &["400", "500", "600", "felt"],
+            &["s 400", "s 500", "p 400", "p 500"],
+            &["s 400", "s 500", "p 600", "p 700"],
+        ] {
+            assert_eq!(of(none), None, "{none:?}");
+        }
+        let twice = names(&["400", "s 400", "500", "400.0 nm"]);
+        assert_eq!(
+            same_wavelength(&twice.iter().collect::<Vec<_>>()),
+            Some((0, 3))
+        );
     }
 
     #[test]

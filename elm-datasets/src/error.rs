@@ -4,11 +4,13 @@ pub(crate) mod merl;
 pub(crate) mod pbrt;
 pub(crate) mod rgl;
 pub(crate) mod scattered;
+mod wavelengths;
 
 use std::fmt;
 use std::path::PathBuf;
 
 use crate::text::none_or_list;
+pub use wavelengths::WavelengthProblem;
 
 /// Bytes that a file may have, unless its format says how many there are.
 pub(crate) const MAX_FILE_BYTES: u64 = 1 << 30;
@@ -372,6 +374,17 @@ pub enum Error {
         /// The channels there are.
         channels: Vec<String>,
     },
+    /// Wavelengths given for the channels of a file that cannot be theirs.
+    #[error("{}: {problem}", path.display())]
+    Wavelengths {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with them.
+        problem: WavelengthProblem,
+    },
+    /// A spectrum whose colour was asked for and that has none.
+    #[error(transparent)]
+    Color(#[from] crate::color::Problem),
     /// A text that names no format.
     #[error("{text:?} is no file format: expected csv, merl, rgl or pbrt")]
     UnknownFormatName {

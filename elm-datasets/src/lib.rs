@@ -7,6 +7,7 @@
 //! - [`paint`] is a single synthetic material, as glossy as materials get.
 //! - [`open()`] reads [`Samples`] of one material from a file of any format: your own as CSV
 //!   ([`scattered`]), the [`merl`] and [`rgl`] databases, and [`pbrt`]-v2.
+//! - [`color`] makes colours of spectra.
 //! - [`csv`] reads numeric tables; [`toy`] makes regression problems with known answers.
 //!
 //! Directions are unit vectors in the frame of the surface, which readers make of a file's angles
@@ -37,6 +38,7 @@
 
 pub mod brdf;
 pub mod channel;
+pub mod color;
 pub mod csv;
 pub mod curet;
 pub mod error;

@@ -6,6 +6,7 @@ use std::str::FromStr;
 
 use ndarray::Axis;
 
+use crate::error::WavelengthProblem;
 use crate::merl::Merl;
 use crate::rgl::Rgl;
 use crate::text::shorten;
@@ -248,6 +249,9 @@ pub fn open(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Opened, Err
     if matches!(format, Format::Merl | Format::Rgl | Format::Pbrt) {
         samples = chosen(path, samples, &options.columns)?;
     }
+    if !options.columns.wavelengths.is_empty() {
+        samples.channels = at_wavelengths(path, &samples.channels, &options.columns.wavelengths)?;
+    }
     // A formula's table has no fill values.
     let measured = matches!(format, Format::Scattered | Format::Pbrt);
     let fills = if measured && options.invalid != Invalid::Keep {
@@ -289,6 +293,33 @@ pub fn open(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Opened, Err
         notes,
         unmeasured,
     })
+}
+
+/// The names of channels whose wavelengths are given.
+fn at_wavelengths(
+    path: &Path,
+    channels: &[String],
+    wavelengths: &[f64],
+) -> Result<Vec<String>, Error> {
+    let wrong = |problem| Error::Wavelengths {
+        path: path.to_owned(),
+        problem,
+    };
+    if wavelengths.len() != channels.len() {
+        return Err(wrong(WavelengthProblem::Count {
+            given: wavelengths.len(),
+            channels: channels.len(),
+        }));
+    }
+    let mut sorted = wavelengths.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let twice = sorted.windows(2).find(|two| two[0] >= two[1]);
+    let mut numbers = wavelengths.iter();
+    let none = numbers.find(|nm| !(**nm > 0.0 && nm.is_finite()));
+    match none.or(twice.map(|two| &two[1])) {
+        Some(&found) => Err(wrong(WavelengthProblem::Number { found })),
+        None => Ok(wavelengths.iter().map(|nm| format!("{nm} nm")).collect()),
+    }
 }
 
 /// The channels asked for, of a file that is no table of columns.

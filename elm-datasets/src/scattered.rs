@@ -85,6 +85,8 @@ pub struct Columns {
     pub angles: [Option<f64>; 4],
     /// Whether the values are reflectance factors, BRDF times pi. They are then divided by pi.
     pub reflectance_factor: bool,
+    /// The wavelengths of the channels in nm, in their order, where their names do not say them.
+    pub wavelengths: Vec<f64>,
 }
 
 /// Reads samples from a CSV file.

@@ -29,7 +29,14 @@ pub struct Packed<A: Real> {
     features: Features,
     neurons: usize,
     layers: Layers<A>,
+    /// Outputs of the network.
+    outputs: usize,
+    /// From the outputs to the targets of all channels, where they are fewer.
+    basis: Option<Dense<A>>,
     transforms: Vec<InverseTransform<A>>,
+    /// What each channel adds to red, green and blue, where the values are colours.
+    color: Option<Vec<[A; 3]>>,
+    multiply_adds: usize,
     floats: usize,
     floats_per_channel: usize,
 }
@@ -140,10 +147,23 @@ impl<A: Real> Packed<A> {
                 ),
             }
         };
+        let basis = model.target_transform().basis().map(|basis| {
+            let (axes, mean) = (basis.axes(), basis.mean());
+            let weight = |output: usize, channel: usize| axes[[output, channel]];
+            Dense::new(basis.outputs(), basis.channels(), weight, |k| mean[k])
+        });
+        let color = model.target_transform().color().map(|weights| {
+            let packed = weights.iter().map(|three| three.map(A::from_f64));
+            packed.collect()
+        });
         Ok(Self {
             features: model.features(),
             neurons: layer.neurons(),
             layers,
+            outputs,
+            basis,
+            color,
+            multiply_adds: model.multiply_adds(),
             transforms: model
                 .target_transform()
                 .by_channel()
@@ -166,8 +186,13 @@ impl<A: Real> Packed<A> {
     }
 
     /// Blocks that the network's outputs take, in threes.
-    fn outputs(&self) -> usize {
-        self.transforms.len().next_multiple_of(3)
+    fn output_blocks(&self) -> usize {
+        self.outputs.next_multiple_of(3)
+    }
+
+    /// Values for each pair.
+    fn values(&self) -> usize {
+        self.color.as_ref().map_or(self.transforms.len(), |_| 3)
     }
 }
 
@@ -226,7 +251,8 @@ impl<A: Real> Kernel<A> for Packed<A> {
             Layers::Any { hidden, .. } => hidden.blocks(),
             _ => 0,
         };
-        self.inputs() + self.outputs() + hidden
+        let basis = self.basis.as_ref().map_or(0, Dense::blocks);
+        self.inputs() + self.output_blocks() + hidden + basis
     }
 
     #[inline(always)]
@@ -238,7 +264,9 @@ impl<A: Real> Kernel<A> for Packed<A> {
         out: &mut [Block<A>],
     ) {
         let (x, rest) = scratch.split_at_mut(self.inputs());
-        let (targets, hidden_values) = rest.split_at_mut(self.outputs());
+        let (targets, rest) = rest.split_at_mut(self.output_blocks());
+        let basis = self.basis.as_ref().map_or(0, Dense::blocks);
+        let (of_channels, hidden_values) = rest.split_at_mut(basis);
         inputs::compute(self.features, directions, x);
         match &self.layers {
             Layers::Rectified(layers) => {
@@ -268,9 +296,38 @@ impl<A: Real> Kernel<A> for Packed<A> {
                 output.run::<S, false>(simd, &hidden_values[..self.neurons], targets);
             }
         }
+        let targets = match &self.basis {
+            None => &*targets,
+            Some(basis) => {
+                basis.run::<S, false>(simd, &targets[..self.outputs], of_channels);
+                &*of_channels
+            }
+        };
         let (iz, oz) = (directions[2], directions[5]);
-        for ((transform, targets), out) in self.transforms.iter().zip(&*targets).zip(out) {
-            transform.values(targets, iz, oz, out);
+        match &self.color {
+            None => {
+                for ((transform, targets), out) in self.transforms.iter().zip(targets).zip(out) {
+                    transform.values(targets, iz, oz, out);
+                }
+            }
+            Some(weights) => {
+                out.fill(Block::zero());
+                let mut value = Block::zero();
+                for ((transform, targets), weights) in
+                    self.transforms.iter().zip(targets).zip(weights)
+                {
+                    transform.values(targets, iz, oz, &mut value);
+                    for (out, &weight) in out.iter_mut().zip(weights) {
+                        for (sum, &value) in out.0.iter_mut().zip(&value.0) {
+                            *sum = *sum + weight * value;
+                        }
+                    }
+                }
+                // What a screen cannot show.
+                for part in out.iter_mut().flat_map(|out| &mut out.0) {
+                    *part = part.max(A::zero());
+                }
+            }
         }
     }
 }
@@ -281,13 +338,13 @@ impl<A: Real> Packed<A> {
     /// # Errors
     /// [`Error::Shape`] unless `out` has a value for each pair and channel.
     pub fn eval_into(&self, directions: &Columns<A>, out: &mut [A]) -> Result<()> {
-        run(self, self.transforms.len(), directions, out)
+        run(self, self.values(), directions, out)
     }
 }
 
 impl<A: Real> Batched<A> for Packed<A> {
     fn channels(&self) -> usize {
-        self.transforms.len()
+        self.values()
     }
 
     fn eval_into(&self, directions: &Columns<A>, out: &mut [A]) -> Result<()> {
@@ -299,7 +356,7 @@ macro_rules! brdf {
     ($type:ident, $precision:ident) => {
         impl Brdf for Packed<$type> {
             fn channels(&self) -> usize {
-                self.transforms.len()
+                self.values()
             }
 
             fn is_isotropic(&self) -> bool {
@@ -317,7 +374,7 @@ macro_rules! brdf {
 
         impl Model for Packed<$type> {
             fn multiply_adds(&self) -> usize {
-                self.neurons * (self.inputs() + self.transforms.len())
+                self.multiply_adds
             }
 
             fn floats_per_channel(&self) -> usize {

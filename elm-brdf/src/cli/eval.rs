@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::file;
 use crate::metrics::Metrics;
 use crate::model::BrdfModel;
-use elm_datasets::Brdf;
+use elm_datasets::{Brdf, channel};
 
 /// Judge a saved model by measurements.
 #[derive(Debug, Args)]
@@ -116,7 +116,7 @@ impl Evaluation {
                 let mut text = format!(
                     "{} rows of {source}, channels {}\n{counts}\n{} neurons, {} stored numbers\n",
                     self.rows,
-                    self.channels.join(", "),
+                    channel::described(&self.channels),
                     self.neurons,
                     self.stored_floats
                 );

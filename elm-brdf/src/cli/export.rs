@@ -114,7 +114,7 @@ impl Arguments {
         }
         let Some(samples) = samples else {
             let model: BrdfModel = file::load(Path::new(&self.model))?;
-            return Ok(Box::new(model.in_rgb_order()?));
+            return Ok(Box::new(model.in_color()?));
         };
         let material = self.reading.read(samples)?;
         let (source, samples) = (material.source, material.samples.in_rgb_order());
@@ -126,6 +126,6 @@ impl Arguments {
         let mut about = model.provenance().clone();
         about.data = source;
         about.channels = samples.channels;
-        Ok(Box::new(model.clone().with_provenance(about)))
+        Ok(Box::new(model.clone().with_provenance(about).in_color()?))
     }
 }

@@ -13,9 +13,10 @@ use crate::error::Error;
 use crate::features::Features;
 use crate::file;
 use crate::metrics::Metric;
-use crate::model::{BrdfModel, Tuned};
+use crate::model::{BrdfModel, Tuned, changes_after_half_turn};
 use crate::prior::Prior;
 use crate::quality;
+use elm_datasets::channel;
 use elm_datasets::geometry::DirectionPair;
 
 /// Fit a network to measurements and save it as one file.
@@ -98,6 +99,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if !model.features().is_isotropic() {
         text.push_str(GRAIN_NOTICE);
     }
+    if changes_after_half_turn(pairs, values)? {
+        text.push_str(ONE_SIDED);
+    }
     text.push_str(&what_is_missing(pairs));
     text.push_str(&albedo_of(&model)?);
     text.push_str(&format!("written to {}\n", arguments.output.display()));
@@ -108,6 +112,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
 const GRAIN_NOTICE: &str = "\
 the surface has a grain: it looks different when it is turned about its normal, and the model turns with it; \
 azimuths count from the x axis of the measurements\n";
+
+/// What a user of a surface without the symmetry of a grain must know.
+const ONE_SIDED: &str = "\
+warning: the surface looks different after half a turn about its normal, which no model here can tell: it is \
+fitted as if it looked the same\n";
 
 /// What a user with measurements in the plane of incidence must know.
 const ONE_PLANE: &str = "\
@@ -196,12 +205,16 @@ fn describe(model: &BrdfModel, counts: &str, seconds: f64) -> String {
     let mut text = format!(
         "{} measurements of {}, channels {}\n\
          {counts}\n\
-         {neurons} {} on '{}', {} stored numbers, fitted in {seconds:.3} s\n",
+         {neurons} {} on '{}'{}, {} stored numbers, fitted in {seconds:.3} s\n",
         about.rows,
         about.data,
-        about.channels.join(", "),
+        channel::described(&about.channels),
         if neurons == 1 { "neuron" } else { "neurons" },
         model.features(),
+        match model.network().outputs() {
+            outputs if outputs < about.channels.len() => format!(", {outputs} outputs"),
+            _ => String::new(),
+        },
         model.stored_floats(),
     );
     if let Some(prior) = &about.prior {

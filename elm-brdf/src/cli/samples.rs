@@ -34,6 +34,25 @@ fn angle(text: &str) -> Result<(usize, f64), String> {
     }
 }
 
+/// A wavelength, or equal steps from the first to the last.
+fn wavelengths(text: &str) -> Result<Vec<f64>, String> {
+    let expected =
+        || "expected wavelengths in nm, such as 550, or steps, such as 400:700:20".to_owned();
+    let parts: Vec<f64> = text
+        .split(':')
+        .map(|part| part.trim().parse().map_err(|_| expected()))
+        .collect::<Result<_, _>>()?;
+    match parts.as_slice() {
+        [one] => Ok(vec![*one]),
+        [first, last, step] if first <= last && *step > 0.0 && (last - first) / step < 1e4 => {
+            // The last one too where rounding leaves it a little above.
+            let steps = ((last - first) / step + 1e-6).floor() as u32;
+            Ok((0..=steps).map(|k| first + f64::from(k) * step).collect())
+        }
+        _ => Err(expected()),
+    }
+}
+
 /// What a table does not say of its directions.
 #[derive(Debug, Args)]
 pub(super) struct AngleReading {
@@ -70,6 +89,10 @@ pub(super) struct Reading {
     /// Columns of a CSV file (or channels of another file) to leave out, with commas between.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     ignore: Vec<String>,
+    /// The wavelengths of the channels in nm, in their order, where their names do not say them: a list with
+    /// commas between, or first:last:step, such as 400:700:20.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = wavelengths)]
+    wavelengths: Vec<Vec<f64>>,
     /// Rows to look a table (MERL, RGL) or a formula up at.
     #[arg(long, value_name = "N", default_value_t = ROWS)]
     rows: usize,
@@ -167,6 +190,7 @@ impl Reading {
                 scatter_cosine: self.cosine_weighted.as_deref() == Some("theta_o"),
                 angles: self.angles.constants()?,
                 reflectance_factor: self.reflectance_factor,
+                wavelengths: self.wavelengths.concat(),
             },
             sampling: Sampling::Random {
                 rows: self.rows,

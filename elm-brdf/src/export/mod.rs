@@ -35,6 +35,7 @@ pub(crate) mod error;
 mod inputs;
 mod network;
 mod precision;
+mod values;
 mod write;
 
 use std::path::Path;
@@ -130,9 +131,7 @@ pub fn merl(brdf: &dyn Brdf) -> Result<Merl> {
 pub fn merl_table(brdf: &dyn Brdf) -> Result<(Merl, f64)> {
     /// Pairs at a time.
     const BLOCK: usize = 1 << 15;
-    let reordered = BrdfModel::of(brdf)
-        .map(BrdfModel::in_rgb_order)
-        .transpose()?;
+    let reordered = BrdfModel::of(brdf).map(BrdfModel::in_color).transpose()?;
     let brdf = match &reordered {
         Some(network) => network as &dyn Brdf,
         None => brdf,

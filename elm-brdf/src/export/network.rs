@@ -12,10 +12,39 @@ pub(super) struct Network {
     pub(super) inputs: Vec<&'static str>,
     pub(super) neurons: Vec<Neuron>,
     pub(super) outputs: Vec<Output>,
+    pub(super) values: Values,
+}
+
+/// How values come of the outputs.
+pub(super) enum Values {
+    /// Each of its own output.
+    Direct(Vec<Channel>),
+    /// Red, green and blue of a spectrum.
+    Color(Vec<Wavelength>),
+}
+
+impl Values {
+    /// How many there are.
+    pub(super) fn count(&self) -> usize {
+        match self {
+            Self::Direct(transforms) => transforms.len(),
+            Self::Color(_) => 3,
+        }
+    }
+}
+
+/// A wavelength of a spectrum.
+pub(super) struct Wavelength {
+    /// Its target where all outputs are 0, and what each output adds.
+    pub(super) mean: f32,
+    pub(super) axes: Vec<f32>,
+    pub(super) transform: Channel,
+    /// What its value adds to red, green and blue.
+    pub(super) color: [f32; 3],
 }
 
 /// A neuron: its function of the weighted sum of the inputs, or of the distance of the weighted
-/// inputs from a centre.
+/// inputs from a center.
 pub(super) struct Neuron {
     /// Name of the function.
     pub(super) activation: String,
@@ -37,12 +66,11 @@ impl Neuron {
     }
 }
 
-/// A channel.
+/// An output.
 pub(super) struct Output {
     pub(super) constant: f32,
     /// Weights of the inputs themselves.
     pub(super) linear: Vec<f32>,
-    pub(super) transform: Channel,
 }
 
 impl Network {
@@ -79,12 +107,12 @@ impl Network {
             let betas = beta.row(neuron).to_vec();
             let own = hidden.weights().column(neuron).to_vec();
             if let Some(scales) = group.input_scales() {
-                // |s (x - mean) factor - c| with the centre taken to the inputs as they come.
+                // |s (x - mean) factor - c| with the center taken to the inputs as they come.
                 let weights: Vec<f64> = (0..inputs).map(|i| scales[i] * scale(i)).collect();
                 let center = (0..inputs).map(|i| own[i] + weights[i] * mean(i));
                 neurons.push(Neuron {
                     activation: activation.to_owned(),
-                    center: Some(singles("a centre", &center.collect::<Vec<_>>())?),
+                    center: Some(singles("a center", &center.collect::<Vec<_>>())?),
                     weights: singles("a scale", &weights)?,
                     bias: 0.0,
                     beta: singles("an output weight", &betas)?,
@@ -119,24 +147,52 @@ impl Network {
         let order = |neuron: &Neuron| (neuron.activation.clone(), neuron.center.is_some());
         neurons.sort_by_key(order);
 
-        let outputs = constants
-            .into_iter()
-            .zip(linear)
-            .zip(model.target_transform().by_channel());
+        let outputs = constants.into_iter().zip(linear);
         Ok(Self {
+            values: values(model)?,
             inputs: model.features().inputs().to_vec(),
             neurons,
             outputs: outputs
-                .map(|((constant, linear), &transform)| {
+                .map(|(constant, linear)| {
                     Ok(Output {
                         constant: single("an intercept", constant)?,
                         linear: singles("a direct link", &linear)?,
-                        transform,
                     })
                 })
                 .collect::<Result<_, ExportError>>()?,
         })
     }
+}
+
+fn values(model: &BrdfModel) -> Result<Values, ExportError> {
+    let transform = model.target_transform();
+    let transforms = transform.by_channel();
+    let Some(color) = transform.color() else {
+        return Ok(Values::Direct(transforms.to_vec()));
+    };
+    let wavelength = |(k, (&of_channel, color)): (usize, (&Channel, &[f64; 3]))| {
+        let (mean, axes) = match transform.basis() {
+            Some(basis) => (basis.mean()[k], basis.axes().column(k).to_vec()),
+            None => {
+                let mut own = vec![0.0; transforms.len()];
+                own[k] = 1.0;
+                (0.0, own)
+            }
+        };
+        let [r, g, b] = *color;
+        Ok(Wavelength {
+            mean: single("a mean target", mean)?,
+            axes: singles("an axis", &axes)?,
+            transform: of_channel,
+            color: [
+                single("a colour", r)?,
+                single("a colour", g)?,
+                single("a colour", b)?,
+            ],
+        })
+    };
+    let wavelengths = transforms.iter().zip(color).enumerate().map(wavelength);
+    Ok(Values::Color(wavelengths.collect::<Result<_, _>>()?))
 }
 
 /// Weights of the inputs of a grain along x, for those of one along another direction.

@@ -65,8 +65,9 @@ impl BrdfModel {
         // The network's weights have the direction of a grain in them.
         let inputs = batch::inputs_of::<f32>(self.features().along_x(), &pairs);
         let exact = self.eval(&pairs)?;
-        let mut single = Array2::zeros(exact.dim());
-        let mut spread = Array2::zeros(exact.dim());
+        let shape = (pairs.len(), network.outputs.len());
+        let mut single = Array2::zeros(shape);
+        let mut spread = Array2::zeros(shape);
         let functions = functions(&network)?;
         for (row, x) in inputs.rows().into_iter().enumerate() {
             let x = x.to_vec();
@@ -97,12 +98,24 @@ impl BrdfModel {
         single: &Array2<f64>,
         spread: &Array2<f64>,
     ) -> Result<SinglePrecision> {
-        let targets = self.network().predict(&self.features().compute(pairs))?;
+        let transform = self.target_transform();
+        let outputs = self.network().predict(&self.features().compute(pairs))?;
+        let targets = transform.in_channels(outputs.view());
+        let single = &transform.in_channels(single.view());
+        // Of a sum of outputs, whose errors do not know each other.
+        let spread = &match transform.basis() {
+            None => spread.clone(),
+            Some(basis) => {
+                let squares = spread.mapv(|s| s * s);
+                squares
+                    .dot(&basis.axes().mapv(|a| a * a))
+                    .mapv_into(f64::sqrt)
+            }
+        };
         let values = |targets: Array2<f64>| -> Result<Array2<f64>> {
             // A number beyond single precision is not one of the model's.
-            Ok(self
-                .target_transform()
-                .to_values(targets)?
+            Ok(transform
+                .values_of_channels(targets)?
                 .mapv(|value| if value.is_finite() { value } else { 0.0 }))
         };
         let found = values(single.clone())?;

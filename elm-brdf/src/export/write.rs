@@ -6,11 +6,11 @@ use super::activations;
 use super::dialect::Language;
 use super::error::ExportError;
 use super::inputs;
-use super::network::{Network, Neuron, Output};
+use super::network::{Network, Neuron, Values};
 use super::precision;
 use crate::error::{Error, Result};
 use crate::model::BrdfModel;
-use crate::target_transform::Channel;
+use elm_datasets::Brdf;
 
 /// Source of the function `NAME_eval`, with everything that it needs.
 ///
@@ -22,7 +22,7 @@ use crate::target_transform::Channel;
 /// | C | `void NAME_eval(const float light[3], const float viewer[3], float rgb[3])` |
 ///
 /// Three channels that are called by colours or wavelengths are red, green and blue by that,
-/// whatever their order.
+/// whatever their order. Of a spectrum it is the [colour](elm_datasets::color).
 ///
 /// # Errors
 /// [`ExportError`] for a model with a piece that has no source, for a number beyond single
@@ -31,12 +31,12 @@ use crate::target_transform::Channel;
 /// than 1 or 3.
 pub fn source(model: &BrdfModel, language: Language, name: &str) -> Result<String> {
     check_name(name)?;
-    let model = &model.in_rgb_order()?;
-    let network = Network::new(model)?;
-    let channels = network.outputs.len();
+    let model = &model.in_color()?;
+    let channels = model.channels();
     if channels != 1 && channels != 3 {
         return Err(Error::Channels { channels });
     }
+    let network = Network::new(model)?;
     precision::check_precision(model)?;
     let mut writer = Writer {
         language,
@@ -100,12 +100,12 @@ const COMPONENTS: [(&str, &str); 6] = [
     ("oz", "viewer.z"),
 ];
 
-struct Writer<'a> {
-    language: Language,
+pub(super) struct Writer<'a> {
+    pub(super) language: Language,
     /// What the names of all functions begin with.
-    name: &'a str,
-    network: &'a Network,
-    out: String,
+    pub(super) name: &'a str,
+    pub(super) network: &'a Network,
+    pub(super) out: String,
 }
 
 impl<'a> Writer<'a> {
@@ -171,7 +171,7 @@ impl<'a> Writer<'a> {
     }
 
     /// Adds a line to a function's body.
-    fn line(&mut self, text: &str) {
+    pub(super) fn line(&mut self, text: &str) {
         // Writing to a string cannot fail, here and below.
         let _ = writeln!(self.out, "    {text}");
     }
@@ -239,7 +239,8 @@ impl<'a> Writer<'a> {
         let Network {
             inputs,
             neurons,
-            outputs,
+            values,
+            ..
         } = self.network;
         let mut kinds: Vec<&str> = neurons.iter().map(|n| n.activation.as_str()).collect();
         kinds.dedup();
@@ -252,12 +253,19 @@ impl<'a> Writer<'a> {
              // An extreme learning machine, written by elm-brdf {version}.\n\
              // Neurons: {count}, {kinds}\n\
              // Inputs: {inputs}\n\
-             // Channels: {channels}\n\n",
+             // Channels: {channels}{spectrum}\n\n",
             name = self.name,
             version = env!("CARGO_PKG_VERSION"),
             count = neurons.len(),
             kinds = kinds.join(", "),
-            channels = outputs.len(),
+            channels = values.count(),
+            spectrum = match values {
+                Values::Direct(_) => String::new(),
+                Values::Color(spectrum) => format!(
+                    ", linear sRGB of {} wavelengths under D65 (CIE 1931, 2 degrees)",
+                    spectrum.len()
+                ),
+            },
             inputs = inputs.join("; "),
             grain = if inputs.iter().any(|input| input.contains("phi_h")) {
                 TANGENT_NOTICE
@@ -369,11 +377,13 @@ impl<'a> Writer<'a> {
             inputs,
             neurons,
             outputs,
+            ..
         } = self.network;
+        self.spectrum_table();
         if neurons.is_empty() {
             return;
         }
-        // One row per neuron: its weights or its centre, its bias, its output weights.
+        // One row per neuron: its weights or its center, its bias, its output weights.
         let table: Vec<Vec<f32>> = neurons
             .iter()
             .map(|n| {
@@ -390,7 +400,7 @@ impl<'a> Writer<'a> {
             .collect();
         let _ = write!(
             self.out,
-            "/* By neuron: weights of the inputs or centre, bias, output weights. */\n\
+            "/* By neuron: weights of the inputs or center, bias, output weights. */\n\
              static const float {}_neurons[{}][{}] = {{\n{}}};\n\n",
             self.name,
             neurons.len(),
@@ -450,56 +460,6 @@ impl<'a> Writer<'a> {
             }
             first = last;
         }
-    }
-
-    /// From the sums to the value, by the transform's inverse.
-    fn close(&mut self) {
-        let language = self.language;
-        let value = |index: usize, output: &Output| {
-            let t = match language {
-                Language::C => format!("t[{index}]"),
-                _ => format!("t{index}"),
-            };
-            let number = |value: f64| format!("{:?}", (value as f32).min(f32::MAX));
-            let bounded = |value: String, ceiling: f64| {
-                // Of a channel that is black throughout nothing is left to compute.
-                if ceiling as f32 > 0.0 {
-                    format!("min(max({value}, 0.0), {})", number(ceiling))
-                } else {
-                    "0.0".to_owned()
-                }
-            };
-            language.expression(&match output.transform {
-                Channel::Identity => format!("max({t}, 0.0)"),
-                Channel::Log { offset, ceiling } => {
-                    bounded(format!("{} * (exp({t}) - 1.0)", number(offset)), ceiling)
-                }
-                Channel::CubeRoot { ceiling } => bounded(format!("{t} * {t} * {t}"), ceiling),
-            })
-        };
-        let network = self.network;
-        for channel in 0..3 {
-            let text = match (language, network.outputs.get(channel)) {
-                (Language::C, Some(output)) => {
-                    format!("rgb[{channel}] = {};", value(channel, output))
-                }
-                (Language::C, None) => format!("rgb[{channel}] = rgb[0];"),
-                (_, Some(output)) => {
-                    let kind = language.number();
-                    language.define(kind, &format!("v{channel}"), &value(channel, output))
-                }
-                (_, None) => continue,
-            };
-            self.line(&text);
-        }
-        if language != Language::C {
-            let three = language.three();
-            self.line(&match network.outputs.len() {
-                1 => format!("return {three}(v0, v0, v0);"),
-                _ => format!("return {three}(v0, v1, v2);"),
-            });
-        }
-        self.out.push_str("}\n");
     }
 }
 

@@ -109,7 +109,7 @@ pub struct SingleMaterial<'a>(
 
 impl MaterialLoader<NoTable> for SingleMaterial<'_> {
     fn load(&self, _: &NoTable, _: &Path) -> Result<LoadedMaterial, LoadError> {
-        let packed = Packed::<f64>::new(self.0)?;
+        let packed = Packed::<f64>::new(&self.0.in_color()?)?;
         Ok(LoadedMaterial::new(Box::new(packed), ""))
     }
 }
@@ -154,7 +154,8 @@ fn card(item: &GalleryItem, picture: String) -> Result<Card> {
         model,
         held_out,
     } = item;
-    let material = Material::new(Box::new(model.clone()), [1.0; 3], false)?;
+    let shown = model.in_color()?;
+    let material = Material::new(Box::new(shown.clone()), [1.0; 3], false)?;
     let glsl = source(model, Language::Glsl, "shown")?;
     let groups = model.network().hidden().groups().iter();
     let neurons: Vec<String> = groups
@@ -184,7 +185,7 @@ fn card(item: &GalleryItem, picture: String) -> Result<Card> {
         note,
         facts,
         picture,
-        lobes: lobes::draw(model)?,
+        lobes: lobes::draw(&shown)?,
         glsl,
         ceiling: material.max_value()[0],
     })

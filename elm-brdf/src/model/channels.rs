@@ -1,6 +1,7 @@
 //! Matches the channels of a model by name, colour or wavelength.
 
 use elm::Elm;
+use elm_datasets::color::SpectralColor;
 use elm_datasets::{Samples, channel};
 use ndarray::Axis;
 
@@ -30,8 +31,8 @@ impl BrdfModel {
         let own = &self.provenance.channels;
         if own.len() == self.channels() {
             return samples.matched(own).ok_or_else(|| Error::ChannelNames {
-                model: own.join(", "),
-                samples: samples.channels.join(", "),
+                model: channel::described(own),
+                samples: channel::described(&samples.channels),
             });
         }
         if samples.channels.len() == self.channels() {
@@ -44,6 +45,28 @@ impl BrdfModel {
         })
     }
 
+    /// The model as red, green and blue: the [colours](elm_datasets::color) of a spectrum, else as
+    /// [`in_rgb_order`](Self::in_rgb_order).
+    ///
+    /// # Errors
+    /// [`Error::Data`] for a spectrum that has no colour.
+    pub fn in_color(&self) -> Result<Self> {
+        let names = &self.provenance.channels;
+        let color = SpectralColor::of(names).map_err(elm_datasets::Error::from)?;
+        match color.filter(|_| names.len() == self.channels()) {
+            None => self.in_rgb_order(),
+            Some(color) => {
+                let mut provenance = self.provenance.clone();
+                provenance.channels = SpectralColor::CHANNELS.map(str::to_owned).to_vec();
+                Ok(Self {
+                    transform: self.transform.colored(&color)?,
+                    provenance,
+                    ..self.clone()
+                })
+            }
+        }
+    }
+
     /// The model with red first, then green, then blue, where its three channels are called by
     /// colours or wavelengths; as it is where they are not.
     ///
@@ -51,7 +74,7 @@ impl BrdfModel {
     /// Those of [`Elm::from_parts`], for a network that none of this crate's makes.
     pub fn in_rgb_order(&self) -> Result<Self> {
         let places = match channel::rgb(&self.provenance.channels) {
-            Some(places) if self.channels() == 3 && places != [0, 1, 2] => places,
+            Some(places) if self.network.outputs() == 3 && places != [0, 1, 2] => places,
             _ => return Ok(self.clone()),
         };
         let network = Elm::from_parts(

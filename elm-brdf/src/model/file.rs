@@ -52,9 +52,9 @@ impl TryFrom<File> for BrdfModel {
         for (what, expected, found) in [
             ("inputs of the network", inputs, network.inputs()),
             (
-                "channels of the transform",
+                "outputs of the transform",
                 network.outputs(),
-                file.transform.channels(),
+                file.transform.outputs(),
             ),
         ] {
             if expected != found {

@@ -34,7 +34,7 @@ use elm_datasets::brdf::check_directions;
 use elm_datasets::geometry::DirectionPair;
 pub use global_scaling::GlobalScaling;
 pub use layer::{Draw, Layer};
-pub use tuned::{Compact, SideBySide, Tuned};
+pub use tuned::{Compact, SideBySide, Tuned, changes_after_half_turn};
 
 /// What a [`BrdfModel`] is made of.
 #[derive(Debug, Clone, PartialEq)]
@@ -160,7 +160,7 @@ impl BrdfModel {
         self.network.beta().len()
             + self.network.outputs()
             + scaler
-            + self.transform.channels() * self.transform.floats_per_channel()
+            + self.transform.floats()
             + self.layer.stored_floats()
     }
 
@@ -248,7 +248,7 @@ impl BrdfModel {
 
 impl Brdf for BrdfModel {
     fn channels(&self) -> usize {
-        self.network.outputs()
+        self.transform.channels()
     }
 
     fn is_isotropic(&self) -> bool {
@@ -267,7 +267,13 @@ impl Brdf for BrdfModel {
 impl Model for BrdfModel {
     fn multiply_adds(&self) -> usize {
         let neurons = self.network.hidden().neurons();
+        let basis = self.transform.basis();
         neurons * (self.network.inputs() + self.network.outputs())
+            + basis.map_or(0, |basis| basis.axes().len())
+            + self
+                .transform
+                .color()
+                .map_or(0, |weights| 3 * weights.len())
     }
 
     fn stored_floats(&self) -> usize {
@@ -276,8 +282,13 @@ impl Model for BrdfModel {
 
     fn floats_per_channel(&self) -> usize {
         // What channels share counts whole for each.
-        let outputs = self.network.outputs().max(1);
-        let own = self.network.beta().nrows() + 1 + self.transform.floats_per_channel();
-        own + self.stored_floats() - own * outputs
+        let channels = self.channels().max(1);
+        let own = match (self.transform.basis(), self.transform.color()) {
+            (None, None) => self.network.beta().nrows() + 1 + self.transform.floats_per_channel(),
+            (Some(_), None) => self.transform.floats_per_channel(),
+            // A colour takes all wavelengths.
+            (_, Some(_)) => 0,
+        };
+        self.stored_floats() - own * (channels - 1)
     }
 }

@@ -11,6 +11,7 @@ mod finish;
 mod large_data;
 mod limit;
 mod normal_equations;
+mod outputs;
 mod problem;
 mod rows;
 mod small_data;
@@ -28,6 +29,7 @@ use crate::fit::{Fit, Model, check};
 use crate::metrics::Metric;
 use crate::quality;
 use crate::target_transform::{FittedTransform, TargetTransform};
+pub use anisotropy::changes_after_half_turn;
 pub use compact::Compact;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::DirectionPair;
@@ -68,6 +70,9 @@ use problem::Problem;
 /// angle above 1 unless that of the nearest measurements is, is taken before any other. Noise of dark
 /// values is accounted for: the transform's offset is at least three of its standard deviations, and where
 /// RMSE is asked for the fit is of the mean value, not of the value of the mean target.
+///
+/// **Many channels** (more than [`Tuned::DIRECT`]), such as wavelengths, share a few outputs, of which their
+/// targets are combinations: as many as the error at rows left out asks for.
 ///
 /// **Size**, unless it is given: at most 213 neurons, which for three channels is 675 stored numbers; no more
 /// numbers than were measured, and of more than 1,000 at most half as many, but always
@@ -123,6 +128,8 @@ impl Tuned {
     pub const FEW: usize = 600;
     /// With more measurements than this they count as many.
     pub const LIMIT: usize = 1500;
+    /// With no more channels than this each has an output of its own.
+    pub const DIRECT: usize = 3;
     /// Sets of inputs for many measurements: all but the paper's, which no material is best served by.
     const MANY_SETS: [Features; 7] = [
         Features::HalfDiff,
@@ -170,6 +177,10 @@ impl Tuned {
             let anisotropic = settings
                 .first()
                 .is_some_and(large_data::Setting::is_anisotropic);
+            if let Some(setting) = settings.first() {
+                transform =
+                    large_data::with_outputs(self, transform, pairs, values, &rows, setting)?;
+            }
             let problem = self.problem(pairs, values, transform, noise, &raised, anisotropic)?;
             let found = large_data::best(&problem, &settings, &rows)?;
             return model_of(&problem, found);
@@ -181,13 +192,20 @@ impl Tuned {
             search = small_data::Search::new(self, pairs, values, &transform, direction)?;
         }
         let anisotropic = search.is_anisotropic();
+        transform = search.with_outputs(transform, pairs)?;
         let problem = self.problem(pairs, values, transform, noise, &raised, anisotropic)?;
         let mut found = search.best(&problem)?;
         if pairs.len() > Self::FEW {
             let rows = large_data::search_rows(self, pairs.len());
             let sets = self.sets(&Self::FEW_SETS, direction);
-            let settings =
-                large_data::search(self, &problem.transform, pairs, values, &rows, &sets)?;
+            let settings = large_data::search(
+                self,
+                &problem.transform.plain(),
+                pairs,
+                values,
+                &rows,
+                &sets,
+            )?;
             let other = large_data::best(&problem, &settings, &rows)?;
             if problem.noisy && other.excess <= found.excess {
                 // Of noisy rows all count, and the limit has some of them.
@@ -245,19 +263,21 @@ impl Tuned {
         usual: usize,
         rows: usize,
         inputs: usize,
-        channels: usize,
+        Width { channels, outputs }: Width,
         drawn: impl Fn(usize) -> usize,
     ) -> Result<usize> {
         let wanted = self.neurons.unwrap_or(usual);
         let Some(most) = self.most_floats(rows, channels) else {
             return Ok(wanted);
         };
-        // Mean, factor and scale of each input; constant and transform of each channel.
-        let fixed = 3 * inputs + 3 * channels;
-        let floats = |neurons: usize| fixed + channels * neurons + drawn(neurons).div_ceil(32);
+        // Of fewer outputs than channels a mean, and a part of every axis, of each channel.
+        let basis = if outputs < channels { 1 + outputs } else { 0 };
+        // Mean, factor and scale of each input; constant of each output, transform of each channel.
+        let fixed = 3 * inputs + outputs + channels * (2 + basis);
+        let floats = |neurons: usize| fixed + outputs * neurons + drawn(neurons).div_ceil(32);
         let largest = match (self.neurons, self.max_floats) {
             (Some(neurons), _) => neurons,
-            (None, Some(most)) => most / channels,
+            (None, Some(most)) => most / outputs,
             (None, None) => usual,
         };
         let found = (1..=largest).rev().find(|&neurons| floats(neurons) <= most);
@@ -270,7 +290,7 @@ impl Tuned {
             (None, Some(_)) => Err(Error::Parameter {
                 name: "max_floats",
                 value: most as f64,
-                expected: "enough for input scales, target transforms and one neuron: about 20 or more",
+                expected: "enough for input scales, one neuron and a few numbers for each channel: about 20 or more",
             }),
         }
     }
@@ -351,6 +371,22 @@ impl Model for SideBySide {
             .map(Model::floats_per_channel)
             .max()
             .unwrap_or(0)
+    }
+}
+
+/// How many channels values have, and how many outputs a network has for them.
+#[derive(Clone, Copy)]
+struct Width {
+    channels: usize,
+    outputs: usize,
+}
+
+impl Width {
+    fn of(transform: &FittedTransform) -> Self {
+        Self {
+            channels: transform.channels(),
+            outputs: transform.outputs(),
+        }
     }
 }
 

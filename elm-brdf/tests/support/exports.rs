@@ -4,13 +4,14 @@ use elm::advanced::NeuronBlock;
 use elm::{Activation, Biases, ElmParams, NeuronGroup, solve::Ridge};
 use elm_brdf::features::Features;
 use elm_brdf::fit::Fit;
-use elm_brdf::model::{BrdfModel, BrdfParams};
+use elm_brdf::model::{BrdfModel, BrdfParams, Provenance, Tuned};
 use elm_brdf::recipes;
+use elm_brdf::target_transform::TargetTransform;
 use elm_brdf::target_transform::TargetTransform;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::{DirectionPair, cartesian};
 use elm_datasets::{Invalid, MaterialId, Samples, synthetic};
-use ndarray::s;
+use ndarray::{Array2, s};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -85,12 +86,55 @@ pub(crate) fn models() -> Vec<(String, Box<dyn Brdf>)> {
             (format!("m{index}"), model)
         })
         .collect();
+    models.extend(spectral(&samples));
     let usual = recipes::network(None);
     models.push((
         "usual".to_owned(),
         usual.fit(pairs, samples.values.view()).unwrap(),
     ));
     models
+}
+
+/// Spectra made of red, green and blue, with a basis and without, whose wavelengths are no multiple of four.
+fn spectral(samples: &Samples) -> Vec<(String, Box<dyn Brdf>)> {
+    let of = |count: usize| {
+        let values = Array2::from_shape_fn((samples.values.nrows(), count), |(row, k)| {
+            let x = 2.0 * k as f64 / (count - 1) as f64;
+            let share = |place: f64| (1.0 - (x - place).abs()).max(0.0);
+            let rgb = samples.values.row(row);
+            rgb[2] * share(0.0) + rgb[1] * share(1.0) + rgb[0] * share(2.0)
+        });
+        let step = 300.0 / (count - 1) as f64;
+        let names: Vec<String> = (0..count)
+            .map(|k| format!("{} nm", 400.0 + step * k as f64))
+            .collect();
+        (values, names)
+    };
+    let pairs = &samples.directions;
+    let colored = |model: BrdfModel, channels: Vec<String>| -> Box<dyn Brdf> {
+        let about = Provenance {
+            channels,
+            ..model.provenance().clone()
+        };
+        Box::new(model.with_provenance(about).in_color().unwrap())
+    };
+    let tuned = Tuned {
+        neurons: Some(30),
+        ..Tuned::default()
+    };
+    let (values, names) = of(9);
+    let few = tuned.fit_model(pairs, values.view()).unwrap();
+    let cubes = BrdfParams {
+        features: Features::Cosines,
+        transform: TargetTransform::CubeRoot,
+        network: network(22, Activation::Sine),
+    };
+    let (others, other_names) = of(6);
+    let all = cubes.fit_model(pairs, others.view()).unwrap();
+    vec![
+        ("spectrum".to_owned(), colored(few, names)),
+        ("cubes".to_owned(), colored(all, other_names)),
+    ]
 }
 
 /// Random pairs and every special one, in single precision as the exports take them.
@@ -160,6 +204,17 @@ const EPS: f64 = 5.960_464_477_539_063e-8;
 /// activation, which takes exp of -2|z|, is off by at most 8 EPS; inputs are a handful of
 /// correctly rounded operations and the arc tangent, 16 EPS with theirs.
 fn bounds(model: &BrdfModel, pairs: &[DirectionPair]) -> Vec<Option<[f64; 3]>> {
+    if model
+        .target_transform()
+        .to_targets(Array2::zeros((1, 3)).view())
+        .is_err()
+        && model.channels() == 3
+    {
+        // Of a spectrum the model's own account: the largest of the standard deviations of errors, or errors
+        // themselves, over the hemisphere. Six of these are never reached.
+        let most = 6.0 * model.single_precision_error().unwrap().largest;
+        return vec![Some([most; 3]); pairs.len()];
+    }
     let network = model.network();
     let hidden = network.hidden();
     let (inputs, neurons) = (network.inputs(), hidden.neurons());

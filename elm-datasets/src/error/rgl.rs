@@ -92,14 +92,13 @@ pub enum Problem {
         /// Which of the tables, counted from 0.
         table: usize,
     },
-    /// A material with a grain, which is not supported.
+    /// Azimuths of a material with a grain that no symmetry completes.
     #[error(
-        "expected an isotropic material, with 1 or 2 azimuths phi_i; found {azimuths}: anisotropic \
-         files cannot be read"
+        "field \"phi_i\": expected azimuths that span a turn, half of one or a quarter, found {span:.1} degrees"
     )]
-    Anisotropic {
-        /// How many azimuths there are.
-        azimuths: usize,
+    Azimuths {
+        /// From the first to the last, in degrees.
+        span: f64,
     },
 }
 

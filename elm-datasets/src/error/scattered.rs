@@ -151,6 +151,16 @@ pub enum Problem {
         /// The names there are.
         columns: List,
     },
+    /// Two columns of one wavelength.
+    #[error(
+        "columns {first:?} and {second:?} are of the same wavelength; leave one out with --ignore"
+    )]
+    SameWavelength {
+        /// The one's name, shortened if long.
+        first: String,
+        /// The other's.
+        second: String,
+    },
     /// A table with a row per wavelength that has several values in a row.
     #[error(
         "expected one column of values beside the wavelength, found {columns}; name it with --channels"

@@ -1,4 +1,4 @@
-//! The `.bsdf` files of the RGL material database: isotropic materials, in RGB or as spectra.
+//! The `.bsdf` files of the RGL material database, in RGB or as spectra.
 //!
 //! J. Dupuy, W. Jakob, *An Adaptive Parameterization for Efficient Material Acquisition and
 //! Rendering*, ACM Transactions on Graphics 37(6), 2018. The database does not come with this
@@ -14,7 +14,7 @@
 //!
 //! | field | shape | content |
 //! |---|---|---|
-//! | `theta_i`, `phi_i` | (n), (1 or 2) | the incident directions measured, in radians |
+//! | `theta_i`, `phi_i` | (n), (m) | the incident directions measured, in radians |
 //! | `ndf`, `sigma` | (v, u) each | $D$ and $\sigma$ over the unit square of $\omega_m$, $\omega_i$ |
 //! | `vndf` | (`phi_i`, `theta_i`, v, u) | density of the normals that are seen from $\omega_i$, over the unit square of $\omega_m$ |
 //! | `rgb` | (`phi_i`, `theta_i`, 3, k, k) | $S$ over the square that `vndf` is flattened to |
@@ -25,10 +25,14 @@
 //! isotropic material's $\phi_m$ counts from $\phi_i$. All else is interpolated linearly, and held
 //! beyond the ends of `theta_i`. `luminance` serves to draw directions, which nothing here does.
 //!
+//! A file with more than two azimuths `phi_i` is of a material with a grain. They span a whole turn; or half
+//! of one, where half a turn changes nothing; or a quarter, where mirroring at x or y changes nothing.
+//! Directions from other azimuths are those of their images.
+//!
 //! **Not checked on a file of the database**, for none was at hand: this was written from the
 //! publication and its authors' description of the format. It is checked on files made from
-//! formulas: where every step has a known answer, and against the authors' renderer, which gives
-//! the same values to its 32 bits for an RGB and a spectral file (`benches/peers/rgl_mitsuba.py`
+//! formulas: where every step has a known answer, and, for isotropic ones, against the authors' renderer,
+//! which gives the same values to its 32 bits for an RGB and a spectral file (`benches/peers/rgl_mitsuba.py`
 //! makes them). That renderer, Mitsuba 3.9.1, takes the viewer
 //! for $\omega_i$ and the light for $\omega_o$; here they are what their names say. For a material
 //! that is reciprocal it makes no difference.
@@ -36,6 +40,7 @@
 // Formulas are not code.
 #![allow(clippy::doc_markdown)]
 
+mod azimuths;
 mod tensor;
 mod warp;
 
@@ -48,6 +53,7 @@ use crate::brdf::{Brdf, EvalError, check_arguments};
 pub use crate::error::rgl::Problem;
 use crate::geometry::{DirectionPair, half_vector, polar};
 use crate::{Error, Samples, Sampling, file};
+use azimuths::Azimuths;
 use tensor::{F32, Field, U8};
 use warp::{Axis, Size, Warp};
 
@@ -85,7 +91,7 @@ impl Channels {
     }
 }
 
-/// An isotropic material of the RGL database.
+/// A material of the RGL database.
 ///
 /// ```no_run
 /// use elm_datasets::{Sampling, rgl::Rgl};
@@ -99,7 +105,7 @@ impl Channels {
 pub struct Rgl {
     channels: Channels,
     jacobian: bool,
-    phi_i: Axis,
+    phi_i: Azimuths,
     theta_i: Axis,
     ndf: Table,
     sigma: Table,
@@ -128,7 +134,7 @@ impl Rgl {
     ///
     /// # Errors
     /// [`Error::Read`] if the file cannot be read, [`Error::Rgl`] with the [`Problem`] if it is no
-    /// isotropic material.
+    /// such material.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         Self::from_bytes(&file::read(path)?).map_err(|problem| Error::Rgl {
@@ -140,16 +146,12 @@ impl Rgl {
     /// As [`read`](Self::read), from the bytes of a file.
     ///
     /// # Errors
-    /// The [`Problem`], if it is no isotropic material.
+    /// The [`Problem`], if it is no such material.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Problem> {
         let fields = Fields(tensor::fields(bytes)?);
-        let phi_i = fields.axis("phi_i")?;
-        if phi_i.0.len() > 2 {
-            let azimuths = phi_i.0.len();
-            return Err(Problem::Anisotropic { azimuths });
-        }
+        let phi_i = Azimuths::new(fields.axis("phi_i")?)?;
         let theta_i = fields.axis("theta_i")?;
-        let incident = [phi_i.0.len() as u64, theta_i.0.len() as u64];
+        let incident = [phi_i.count() as u64, theta_i.0.len() as u64];
         let jacobian = fields.layout("jacobian", U8, "one byte", |shape| shape == [1])?;
         let channels = match fields.find("rgb") {
             Some(_) => Channels::Rgb,
@@ -204,18 +206,26 @@ impl Rgl {
 
     /// `values` has a zero for each channel.
     fn write_at(&self, pair: &DirectionPair, values: &mut [f64]) {
-        let DirectionPair {
-            incident: light,
-            outgoing: viewer,
-        } = *pair;
+        let (
+            DirectionPair {
+                incident: light,
+                outgoing: viewer,
+            },
+            azimuths,
+        ) = self.phi_i.place(pair);
         let Some(normal) = half_vector(light, viewer).filter(|_| light[2] > 0.0 && viewer[2] > 0.0)
         else {
             return;
         };
         let ((theta_i, phi_i), (theta_m, phi_m)) = (polar(light), polar(normal));
-        let azimuth = (phi_m - phi_i + PI) / TAU;
+        let zero = if self.phi_i.is_isotropic() {
+            phi_i
+        } else {
+            0.0
+        };
+        let azimuth = (phi_m - zero + PI) / TAU;
         let seen = [square(theta_m), azimuth - azimuth.floor()];
-        let blend = Axis::blend(&self.phi_i, phi_i, &self.theta_i, theta_i);
+        let blend = Axis::blend(azimuths, &self.theta_i, theta_i);
         let flat = self.vndf.flatten(&blend, seen);
         let highlight = if self.jacobian {
             let area = self.sigma.at(0, [square(theta_i), (phi_i + PI) / TAU]);
@@ -265,6 +275,10 @@ impl Rgl {
 impl Brdf for Rgl {
     fn channels(&self) -> usize {
         self.channels.count()
+    }
+
+    fn is_isotropic(&self) -> bool {
+        self.phi_i.is_isotropic()
     }
 
     fn eval_into(

@@ -3,6 +3,10 @@
 //! A table of `width` x `height` numbers stands for the function that is bilinear between them,
 //! the corners of the square being those of the table. The first coordinate runs along a row.
 
+use std::f64::consts::TAU;
+
+/// Two slices along a parameter, with their weights.
+pub(super) type Pair = [(usize, f64); 2];
 /// Two table slices along each of the two parameters, with their weights.
 pub(super) type Blend = [(usize, f64); 4];
 
@@ -12,7 +16,7 @@ pub(super) struct Axis(pub(super) Vec<f64>);
 
 impl Axis {
     /// The values around `x` and their weights; beyond the ends the value there.
-    fn around(&self, x: f64) -> [(usize, f64); 2] {
+    pub(super) fn around(&self, x: f64) -> Pair {
         let Self(values) = self;
         let after = values.partition_point(|&value| value <= x);
         let left = after.saturating_sub(1).min(values.len().saturating_sub(2));
@@ -25,9 +29,20 @@ impl Axis {
         }
     }
 
+    /// The same of a parameter that goes round: after the last value comes the first, a turn later.
+    pub(super) fn around_a_turn(&self, x: f64) -> Pair {
+        match self.0.as_slice() {
+            [first, .., last] if x > *last && first + TAU > *last => {
+                let weight = ((x - last) / (first + TAU - last)).clamp(0.0, 1.0);
+                [(self.0.len() - 1, 1.0 - weight), (0, weight)]
+            }
+            _ => self.around(x),
+        }
+    }
+
     /// The slices around a point of two parameters, of which the second runs faster.
-    pub(super) fn blend(first: &Self, x: f64, second: &Self, y: f64) -> Blend {
-        let ([a, b], [c, d]) = (first.around(x), second.around(y));
+    pub(super) fn blend([a, b]: Pair, second: &Self, y: f64) -> Blend {
+        let [c, d] = second.around(y);
         [(a, c), (a, d), (b, c), (b, d)].map(|((i, u), (j, v))| (i * second.0.len() + j, u * v))
     }
 }
@@ -240,7 +255,7 @@ mod tests {
         assert_eq!(axis.around(-1.0), [(0, 1.0), (1, 0.0)]);
         assert_eq!(axis.around(9.0), [(1, 0.0), (2, 1.0)]);
         assert_eq!(Axis(vec![0.5]).around(9.0), [(0, 1.0), (0, 0.0)]);
-        let blend = Axis::blend(&Axis(vec![0.0, 1.0]), 0.25, &axis, 2.0);
+        let blend = Axis::blend(Axis(vec![0.0, 1.0]).around(0.25), &axis, 2.0);
         assert_eq!(blend, [(1, 0.375), (2, 0.375), (4, 0.125), (5, 0.125)]);
     }
 

@@ -138,6 +138,13 @@ impl Plan {
             let columns = List::of(channels.iter().map(|&c| &names[c]));
             return Err(Problem::SeveralPerWavelength { columns });
         }
+        let named: Vec<&String> = channels.iter().map(|&column| &names[column]).collect();
+        if let Some((first, second)) = channel::same_wavelength(&named) {
+            return Err(Problem::SameWavelength {
+                first: shorten(named[first]),
+                second: shorten(named[second]),
+            });
+        }
         Ok(Self {
             channels,
             wavelength,

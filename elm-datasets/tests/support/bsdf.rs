@@ -148,6 +148,95 @@ impl Ggx {
     }
 }
 
+/// The same with a grain along x: Heitz 2014, *Understanding the Masking-Shadowing Function in
+/// Microfacet-Based BRDFs*, JCGT 3(2), equations 85 and 86.
+pub struct Brushed {
+    pub alpha: [f64; 2],
+    pub facet: [f64; 3],
+}
+
+impl Brushed {
+    fn distribution(&self, [x, y, z]: [f64; 3]) -> f64 {
+        let [a, b] = self.alpha;
+        1.0 / (PI * a * b * ((x / a).powi(2) + (y / b).powi(2) + z * z).powi(2))
+    }
+
+    fn g(&self, [x, y, z]: [f64; 3]) -> f64 {
+        let [a, b] = self.alpha;
+        ((a * x).powi(2) + (b * y).powi(2) + z * z).sqrt()
+    }
+
+    fn sigma(&self, direction: [f64; 3]) -> f64 {
+        f64::midpoint(direction[2], self.g(direction))
+    }
+
+    /// BRDF per unit of the facets' reflectance; `m` is the half vector.
+    pub fn brdf(&self, i: [f64; 3], o: [f64; 3], m: [f64; 3]) -> f64 {
+        self.distribution(m) * 0.5 / (o[2] * self.g(i) + i[2] * self.g(o))
+    }
+
+    /// As [`Ggx::rest`].
+    fn rest(&self, i: [f64; 3], m: [f64; 3]) -> f64 {
+        let cos = i[0] * m[0] + i[1] * m[1] + i[2] * m[2];
+        let mut o = [0, 1, 2].map(|k| 2.0 * cos * m[k] - i[k]);
+        o[2] = o[2].max(0.01);
+        4.0 * self.sigma(i) * 0.5 / (o[2] * self.g(i) + i[2] * self.g(o)) * o[2]
+    }
+
+    /// As [`Ggx::file`], for light from these azimuths.
+    pub fn file(
+        &self,
+        azimuths: &[f64],
+        elevations: &[f64],
+        fine: usize,
+        coarse: usize,
+    ) -> Vec<u8> {
+        let unit = |theta: f64, phi: f64| {
+            [
+                theta.sin() * phi.cos(),
+                theta.sin() * phi.sin(),
+                theta.cos(),
+            ]
+        };
+        let theta = |u: f64| u * u * PI / 2.0;
+        let at = |u: f64, v: f64| unit(theta(u), (2.0 * v - 1.0) * PI);
+        let (mut vndf, mut rgb) = (Vec::new(), Vec::new());
+        for &phi_i in azimuths {
+            for &theta_i in elevations {
+                let i = unit(theta_i, phi_i);
+                let seen = tabulate(fine, fine, |u, v| {
+                    let m = at(u, v);
+                    let cos = i[0] * m[0] + i[1] * m[1] + i[2] * m[2];
+                    let density = self.distribution(m) * cos.max(0.0) / self.sigma(i);
+                    density * 2.0 * PI * PI * u * theta(u).sin()
+                });
+                let seen: Vec<f64> = seen.iter().map(|&x| f64::from(x as f32)).collect();
+                let rest = tabulate(coarse, coarse, |x, y| {
+                    let [u, v] = unflatten(&seen, fine, [x, y]);
+                    self.rest(i, at(u, v))
+                });
+                for facet in self.facet {
+                    rgb.extend(rest.iter().map(|value| facet * value));
+                }
+                vndf.extend(seen);
+            }
+        }
+        let [f, c, n, k] = [fine, coarse, elevations.len(), azimuths.len()].map(|n| n as u64);
+        let ndf = tabulate(fine, fine, |u, v| self.distribution(at(u, v)));
+        let sigma = tabulate(fine, fine, |u, v| self.sigma(at(u, v)));
+        file(&[
+            bytes("description", b"made from GGX with a grain"),
+            floats("phi_i", &[k], azimuths),
+            floats("theta_i", &[n], elevations),
+            floats("ndf", &[f, f], &ndf),
+            floats("sigma", &[f, f], &sigma),
+            floats("vndf", &[k, n, f, f], &vndf),
+            floats("rgb", &[k, n, 3, c, c], &rgb),
+            bytes("jacobian", &[1]),
+        ])
+    }
+}
+
 /// The inverse of the map that flattens a table of n x n: by bisection of integrals that the
 /// trapezoidal rule has exactly, for the density is linear along every step.
 fn unflatten(table: &[f64], n: usize, [x, y]: [f64; 2]) -> [f64; 2] {

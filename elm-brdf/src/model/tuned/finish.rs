@@ -128,16 +128,24 @@ impl Problem<'_> {
     fn score(&self, held_out: &Array2<f64>) -> Result<f64> {
         let metric = self.tuned.metric;
         if metric == Metric::Rmse {
-            return Ok(geometric_root(&self.variances(held_out)));
+            let transform = self.transform.plain();
+            let values = self.values.select(Axis(0), &self.judged);
+            let targets = transform.to_targets(values.view())?;
+            let errors = self.transform.in_channels(held_out.view()) - targets;
+            return Ok(geometric_root(&self.mean_squares(errors)));
         }
         let metrics = self.metrics(held_out)?;
         Ok(metrics.map_or(0.0, |metrics| metric.of(&metrics)))
     }
 
-    /// The mean squared error of each channel's targets, the largest cut off.
+    /// The mean squared error of each output, the largest cut off.
     fn variances(&self, held_out: &Array2<f64>) -> Vec<f64> {
-        let targets = self.targets(&self.judged);
-        let mut squares = (held_out - &targets).mapv_into(|error| error * error);
+        self.mean_squares(held_out - &self.targets(&self.judged))
+    }
+
+    /// The mean squares of errors at the judged rows, the largest cut off.
+    fn mean_squares(&self, errors: Array2<f64>) -> Vec<f64> {
+        let mut squares = errors.mapv_into(|error| error * error);
         if let Some(weights) = self.weights(&self.judged) {
             squares *= &weights.insert_axis(Axis(1));
         }
@@ -175,6 +183,17 @@ impl Problem<'_> {
         Ok(whole.map(|weights| (predicted, weights)))
     }
 
+    /// What squared errors of each output are relative to: the variance of its targets, which for coordinates in
+    /// a basis is that of all together, as they are of one unit.
+    fn spread(&self) -> Vec<f64> {
+        let columns = self.targets.columns().into_iter();
+        let spread: Vec<f64> = columns.map(|t| t.var(0.0).max(1e-300)).collect();
+        match self.transform.basis() {
+            None => spread,
+            Some(_) => vec![spread.iter().sum(); spread.len()],
+        }
+    }
+
     /// Of the strengths of these steps the one with the least error on rows left out, and what is
     /// predicted for these.
     fn strength(
@@ -184,12 +203,7 @@ impl Problem<'_> {
         pull: Option<&Pull>,
         steps: impl Iterator<Item = usize>,
     ) -> Result<(f64, Array2<f64>)> {
-        let spread: Vec<f64> = self
-            .targets
-            .columns()
-            .into_iter()
-            .map(|t| t.var(0.0).max(1e-300))
-            .collect();
+        let spread = self.spread();
         let mut tried: Vec<(f64, f64, Array2<f64>)> = Vec::new();
         for step in steps {
             let strength = rows.scale * WEAKEST * 10_f64.powf(step as f64 / 2.0);
@@ -300,7 +314,7 @@ impl Problem<'_> {
     }
 }
 
-/// The size of the sum that each neuron's function is applied to, of standardised inputs.
+/// The size of the sum that each neuron's function is applied to, of standardized inputs.
 pub(super) fn reach(hidden: &HiddenLayer<f64>) -> Array1<f64> {
     let squares = hidden.weights().mapv(|w| w * w).sum_axis(Axis(0));
     (squares + hidden.biases().mapv(|b| b * b)).mapv(f64::sqrt)

@@ -8,8 +8,9 @@ use rand::seq::index;
 
 use super::errors::{cut_off_means, dark_noise, geometric_root};
 use super::finish::Finished;
+use super::outputs::Judge;
 use super::problem::Problem;
-use super::{Drawn, TIE, Tuned, better, dataset};
+use super::{Drawn, TIE, Tuned, Width, better, dataset};
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::metrics::{Metric, Metrics};
@@ -102,8 +103,8 @@ fn finished(problem: &Problem<'_>, setting: &Setting, rows: &[usize]) -> Result<
     let tuned = problem.tuned;
     let x = setting.set.compute_training(problem.pairs);
     let scaler = Scaler::measured(&x)?;
-    let channels = problem.values.ncols();
-    let neurons = tuned.size(NEURONS, x.nrows(), x.ncols(), channels, drawn)?;
+    let width = Width::of(&problem.transform);
+    let neurons = tuned.size(NEURONS, x.nrows(), x.ncols(), width, drawn)?;
     let count = drawn(neurons);
     let few = &rows[..rows.len().min(PRUNE_ROWS.max(count))];
     let params = tuned.sine_features(count, &setting.scales);
@@ -118,6 +119,54 @@ fn finished(problem: &Problem<'_>, setting: &Setting, rows: &[usize]) -> Result<
     )?;
     let layer = layer.pruned(&pruned.kept)?;
     problem.finish(setting.set, &layer, &x)
+}
+
+/// `transform` with as many outputs as the error at the rows that judge asks for, each number of them with the neurons
+/// that the limits leave for it.
+pub(super) fn with_outputs(
+    tuned: &Tuned,
+    transform: FittedTransform,
+    pairs: &[DirectionPair],
+    values: ArrayView2<'_, f64>,
+    rows: &[usize],
+    setting: &Setting,
+) -> Result<FittedTransform> {
+    let plain = transform.clone();
+    let search = Search::new(tuned, &plain, pairs, values, rows)?;
+    let inputs = search.inputs(setting.set)?;
+    let judge = Judge {
+        pairs: &search.judged.pairs,
+        values: search.judged.values.view(),
+    };
+    let mut known: Option<(usize, Array2<f64>)> = None;
+    tuned.with_outputs(
+        transform,
+        search.fitted.values.view(),
+        &judge,
+        |transform, outputs| {
+            let width = Width {
+                channels: transform.channels(),
+                outputs,
+            };
+            let inputs_of = inputs.fitted.ncols();
+            let Ok(neurons) = tuned.size(NEURONS, pairs.len(), inputs_of, width, drawn) else {
+                return Ok(None);
+            };
+            // More than half of the rows would leave little to tell neurons by.
+            let neurons = neurons.min(inputs.fitted.nrows() / 2).max(1);
+            if let Some((_, predicted)) = known.as_ref().filter(|(size, _)| *size == neurons) {
+                return Ok(Some(predicted.clone()));
+            }
+            let params = tuned.sine_features(neurons, &setting.scales);
+            let map = Drawn::new(&params, inputs_of, &inputs.scaler)?.map;
+            let params = params.with_solver(Ridge::relative(RIDGE));
+            let targets = transform.to_targets(search.fitted.values.view())?;
+            let network = params.fit_map(map, &dataset(&inputs.fitted, &targets, None)?)?;
+            let predicted = network.predict(&inputs.judged)?;
+            known = Some((neurons, predicted.clone()));
+            Ok(Some(predicted))
+        },
+    )
 }
 
 /// Some of the rows.

@@ -12,8 +12,9 @@ use super::distill::Teacher;
 use super::errors::{dark_noise, row_weights};
 use super::finish::Finished;
 use super::limit::{Limit, Rows, Setting, Smoothness};
+use super::outputs::Judge;
 use super::problem::Problem;
-use super::{Drawn, Tuned, better};
+use super::{Drawn, Tuned, Width, better};
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::metrics::Metric;
@@ -46,6 +47,8 @@ pub(super) struct Search<'a> {
     rows: Vec<usize>,
     values: Array2<f64>,
     found: Vec<Found>,
+    /// All measurements.
+    total: usize,
 }
 
 /// A set of inputs, and its best setting.
@@ -110,6 +113,7 @@ impl<'a> Search<'a> {
             values: values.select(Axis(0), &rows),
             rows,
             found: close,
+            total: pairs.len(),
         })
     }
 
@@ -122,10 +126,52 @@ impl<'a> Search<'a> {
     /// The standard deviation of the noise of each channel's dark half, in 1/sr: of what the best
     /// set is off by at rows left out, by the median, which a few bad rows do not move.
     pub(super) fn noise(&self, transform: &FittedTransform) -> Result<Vec<f64>> {
+        let Some(held_out) = self.held_out()? else {
+            return Ok(vec![0.0; self.values.ncols()]);
+        };
+        let held_out = transform.to_values(held_out)?;
+        let columns = held_out.columns().into_iter().zip(self.values.columns());
+        Ok(columns
+            .map(|(fitted, values)| dark_noise(fitted, values))
+            .collect())
+    }
+
+    /// `transform` with as many outputs as the error at rows left out asks for.
+    pub(super) fn with_outputs(
+        &self,
+        transform: FittedTransform,
+        pairs: &[DirectionPair],
+    ) -> Result<FittedTransform> {
+        let pairs: Vec<DirectionPair> = self.rows.iter().map(|&row| pairs[row]).collect();
+        let values = self.values.view();
+        let judge = Judge {
+            pairs: &pairs,
+            values,
+        };
+        // Of too few rows none can be left out: the rows themselves say what outputs are for.
+        let targets = match self.held_out()? {
+            Some(held_out) => held_out,
+            None => transform.to_targets(values)?,
+        };
+        let tuned = self.tuned;
+        let inputs = self.found.first().map_or(1, |best| best.rows.x.ncols());
+        let total = self.total;
+        tuned.with_outputs(transform, values, &judge, |transform, outputs| {
+            let width = Width {
+                channels: transform.channels(),
+                outputs,
+            };
+            let room = tuned.size(NEURONS, total, inputs, width, |neurons| DRAWN * neurons);
+            Ok(room.is_ok().then(|| transform.project(targets.clone())))
+        })
+    }
+
+    /// What the best set says of the targets of each row without it; `None` for too few rows.
+    fn held_out(&self) -> Result<Option<Array2<f64>>> {
         let count = self.rows.len();
         let channels = self.values.ncols();
         let Some(best) = self.found.first().filter(|_| count >= 4 * FOLDS) else {
-            return Ok(vec![0.0; channels]);
+            return Ok(None);
         };
         let fold = |fold: usize| (fold..count).step_by(FOLDS).collect();
         let folds: Vec<Vec<usize>> = (0..FOLDS).map(fold).collect();
@@ -137,11 +183,7 @@ impl<'a> Search<'a> {
                 held_out.row_mut(row).assign(&without.row(row));
             }
         }
-        let held_out = transform.to_values(held_out)?;
-        let columns = held_out.columns().into_iter().zip(self.values.columns());
-        Ok(columns
-            .map(|(fitted, values)| dark_noise(fitted, values))
-            .collect())
+        Ok(Some(held_out))
     }
 
     /// The network of the best set, or, where its albedo is not physical, of another.
@@ -182,9 +224,9 @@ impl<'a> Search<'a> {
         }
         let inputs = found.rows.x.ncols();
         let rows = problem.pairs.len();
-        let channels = self.values.ncols();
+        let width = Width::of(&problem.transform);
         let drawn = |neurons: usize| DRAWN * neurons;
-        let neurons = self.tuned.size(NEURONS, rows, inputs, channels, drawn)?;
+        let neurons = self.tuned.size(NEURONS, rows, inputs, width, drawn)?;
         let params = ElmParams::new(drawn(neurons))
             .with_activation(Activation::Sine)
             .with_distribution(setting.smoothness.frequencies())
@@ -193,7 +235,11 @@ impl<'a> Search<'a> {
             .with_bounded(false)
             .with_seed(self.tuned.seed);
         let candidates = Drawn::new(&params, inputs, &found.scaler)?;
-        let teacher = Large { found, limit };
+        let teacher = Large {
+            found,
+            limit,
+            transform: &problem.transform,
+        };
         problem.distilled(found.features, &teacher, candidates, &params, neurons)
     }
 
@@ -201,13 +247,12 @@ impl<'a> Search<'a> {
     /// [`Problem::finish`](super::problem::Problem).
     fn fit_means(&self, limit: &mut Limit, problem: &Problem<'_>) -> Result<()> {
         let mut censored = Censored::new(self.values.view(), &problem.noise);
+        let transform = problem.transform.plain();
         for _ in 0..censored.rounds() {
             let fitted = limit.fitted();
-            let means = problem.transform.to_values(fitted.clone())?;
+            let means = transform.to_values(fitted.clone())?;
             let values = censored.completed(self.values.view(), means.view());
-            let working = problem
-                .transform
-                .working_targets(fitted.view(), values.view())?;
+            let working = transform.working_targets(fitted.view(), values.view())?;
             limit.fit(&working);
             censored.learn();
         }
@@ -251,12 +296,15 @@ impl Found {
 struct Large<'a> {
     found: &'a Found,
     limit: Limit,
+    transform: &'a FittedTransform,
 }
 
 impl Teacher for Large<'_> {
     fn targets(&self, pairs: &[DirectionPair]) -> (Array2<f64>, Vec<Array2<f64>>) {
         let x = self.found.features.compute(pairs);
-        self.limit.predict(&standardized(&self.found.scaler, &x))
+        let (all, without) = self.limit.predict(&standardized(&self.found.scaler, &x));
+        let project = |targets| self.transform.project(targets);
+        (project(all), without.into_iter().map(project).collect())
     }
 }
 
