@@ -7,7 +7,6 @@ use elm_brdf::fit::Fit;
 use elm_brdf::model::{BrdfModel, BrdfParams, Provenance, Tuned};
 use elm_brdf::recipes;
 use elm_brdf::target_transform::TargetTransform;
-use elm_brdf::target_transform::TargetTransform;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::{DirectionPair, cartesian};
 use elm_datasets::{Invalid, MaterialId, Samples, synthetic};
