@@ -93,6 +93,9 @@ pub enum Error {
     /// A model could not be exported.
     #[error(transparent)]
     Export(#[from] crate::export::error::ExportError),
+    /// A model could not be written as a tensor file.
+    #[error(transparent)]
+    Tensor(#[from] elm_datasets::rgl::WriteError),
     /// A scene could not be read or rendered.
     #[cfg(feature = "render")]
     #[error(transparent)]

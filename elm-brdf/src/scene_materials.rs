@@ -125,19 +125,22 @@ impl MaterialTable {
     }
 }
 
-/// The table of a file, as it is; of a spectrum the [colors](elm_datasets::color).
+/// The table of a file, as it is, and the names of its channels; of a spectrum the
+/// [colors](elm_datasets::color) if these are asked for.
 ///
 /// # Errors
 /// Those of [`Format::of`] and of the readers; [`Error::UnknownName`] for a file that is no table.
-pub fn measured_table(path: &Path) -> Result<Box<dyn Brdf>> {
+pub fn measured_table(path: &Path, in_color: bool) -> Result<(Box<dyn Brdf>, Vec<String>)> {
+    let rgb = || ["red", "green", "blue"].map(str::to_owned).to_vec();
     Ok(match Format::of(path)? {
-        Format::Merl => Box::new(Merl::read(path)?),
+        Format::Merl => (Box::new(Merl::read(path)?), rgb()),
         Format::Rgl => {
             let table = Rgl::read(path)?;
-            let color = SpectralColor::of(&table.channels().names());
-            match color.map_err(elm_datasets::Error::from)? {
-                None => Box::new(table),
-                Some(color) => Box::new(Colored::new(table, color)),
+            let names = table.channels().names();
+            let color = SpectralColor::of(&names).map_err(elm_datasets::Error::from)?;
+            match color.filter(|_| in_color) {
+                None => (Box::new(table), names),
+                Some(color) => (Box::new(Colored::new(table, color)), rgb()),
             }
         }
         other => {
@@ -332,7 +335,7 @@ impl SceneMaterialLoader {
         };
         match table.source()? {
             Source::Table(file) => {
-                let brdf = Arc::from(measured_table(&dir.join(file))?);
+                let brdf = Arc::from(measured_table(&dir.join(file), true)?.0);
                 Ok(plain(brdf, format!("measured, {}", file.display())))
             }
             Source::Formula(name) => Ok(plain(

@@ -54,6 +54,20 @@ pub fn half_vector(l: Vector, v: Vector) -> Option<Vector> {
     (length > 0.0).then(|| sum.map(|c| c / length))
 }
 
+/// Two unit vectors across the unit vector `n` and each other, which follow `n` smoothly on either side of
+/// $z = 0$; right-handed with `n` as the third (T. Duff et al., *Building an Orthonormal Basis, Revisited*,
+/// JCGT 6(1), 2017).
+#[must_use]
+pub fn tangents([x, y, z]: Vector) -> [Vector; 2] {
+    let sign = 1.0_f64.copysign(z);
+    let a = -1.0 / (sign + z);
+    let b = x * y * a;
+    [
+        [1.0 + sign * x * x * a, sign * b, -sign * x],
+        [b, sign + y * y * a, -y],
+    ]
+}
+
 /// A pair of unit vectors in the frame of the surface: where light comes from and where it goes,
 /// both pointing away from the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,6 +8,7 @@
 //! - [`open()`] reads [`Samples`] of one material from a file of any format: your own as CSV
 //!   ([`scattered`]), the [`merl`] and [`rgl`] databases, and [`pbrt`]-v2.
 //! - [`color`] makes colours of spectra.
+//! - [`mixture`] samples directions in proportion to any [`Brdf`].
 //! - [`csv`] reads numeric tables; [`toy`] makes regression problems with known answers.
 //!
 //! Directions are unit vectors in the frame of the surface, which readers make of a file's angles
@@ -48,6 +49,7 @@ pub mod lobes;
 mod material_id;
 pub mod measurements;
 pub mod merl;
+pub mod mixture;
 mod open;
 pub mod paint;
 pub mod pbrt;

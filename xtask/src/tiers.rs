@@ -14,7 +14,7 @@ pub(crate) struct Tiers {
     /// Also the tests on real measurements, in ELM_BRDF_DATA or ../shared; fails without them.
     #[arg(long)]
     data: bool,
-    /// Also the tests that need Chromium, glslangValidator or a C compiler; fails without them.
+    /// Also the tests that need Chromium, glslangValidator, a C compiler or Mitsuba; fails without them.
     #[arg(long)]
     browser: bool,
     /// Only the tests that the other options add.

@@ -26,8 +26,6 @@ mod error;
 mod film;
 mod light;
 mod loader;
-mod lobe;
-mod lobe_mixture;
 mod material;
 mod material_cache;
 mod mesh;

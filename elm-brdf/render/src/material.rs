@@ -4,10 +4,10 @@
 use ndarray::ArrayViewMut2;
 
 use crate::error::{Error, Result};
-use crate::lobe_mixture::LobeMixture;
 use crate::vector::{Rgb, largest, luminance, scaled, times};
 use elm_datasets::Brdf;
 use elm_datasets::geometry::{DirectionPair, Vector};
+use elm_datasets::mixture::LobeMixture;
 
 /// A model may pass the largest value of the directions asked by this factor; beyond, it is cut off.
 const CEILING_MARGIN: f64 = 2.0;
@@ -72,10 +72,10 @@ impl Material {
         };
         let isotropic = brdf.is_isotropic();
         let pilot = LobeMixture::pilot(isotropic);
-        let first = raw(&pilot.pairs)?;
+        let first = raw(pilot.pairs())?;
         let sampler = LobeMixture::fit(&pilot, &gray(&first), isotropic);
         let points = sampler.points();
-        let values = raw(&points.pairs)?;
+        let values = raw(points.pairs())?;
         let highest = first
             .iter()
             .chain(&values)

@@ -1,6 +1,6 @@
 //! Points and directions in the world, and the frame of a surface.
 
-use elm_datasets::geometry::Vector;
+use elm_datasets::geometry::{Vector, tangents};
 
 /// A point, direction or colour of the world.
 pub(crate) type Vec3 = nalgebra::Vector3<f64>;
@@ -48,15 +48,12 @@ pub(crate) struct ShadingFrame {
 }
 
 impl ShadingFrame {
-    /// A frame about the unit vector `n`, without a branch that makes a seam (Duff et al.,
-    /// *Building an Orthonormal Basis, Revisited*, JCGT 6(1), 2017).
+    /// A frame about the unit vector `n`, by [`tangents`].
     pub(crate) fn from_normal(n: Vec3) -> Self {
-        let sign = 1.0_f64.copysign(n.z);
-        let a = -1.0 / (sign + n.z);
-        let b = n.x * n.y * a;
+        let [tangent, bitangent] = tangents(n.into());
         Self {
-            tangent: Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
-            bitangent: Vec3::new(b, sign + n.y * n.y * a, -n.y),
+            tangent: tangent.into(),
+            bitangent: bitangent.into(),
             normal: n,
         }
     }

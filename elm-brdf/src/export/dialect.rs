@@ -1,7 +1,7 @@
 //! The languages, and how each spells what the others spell otherwise.
 //!
-//! The common notation is arithmetic with decimal literals, names, and calls of `abs`, `exp`,
-//! `floor`, `max`, `min`, `sign` (of 0 it may be anything from -1 to 1) and `sqrt`; it is valid as
+//! The common notation is arithmetic with decimal literals, names, and calls of `abs`, `cos`, `exp`,
+//! `floor`, `max`, `min`, `sign` (of 0 it may be anything from -1 to 1), `sin` and `sqrt`; it is valid as
 //! it is in the three shader languages, for numbers and vectors of four alike.
 
 /// A language that a network can be written in.
@@ -54,6 +54,15 @@ impl Language {
             Self::Glsl => "vec3",
             Self::Wgsl => "vec3<f32>",
             Self::Hlsl | Self::C => "float3",
+        }
+    }
+
+    /// The type of two uniform numbers, in shaders.
+    pub(super) fn two(self) -> &'static str {
+        match self {
+            Self::Glsl => "vec2",
+            Self::Wgsl => "vec2<f32>",
+            Self::Hlsl | Self::C => "float2",
         }
     }
 
@@ -120,11 +129,13 @@ impl Language {
                 }
                 _ => out.push_str(match token {
                     "abs" => "fabsf",
+                    "cos" => "cosf",
                     "copysign" => "copysignf",
                     "exp" => "expf",
                     "floor" => "floorf",
                     "max" => "fmaxf",
                     "min" => "fminf",
+                    "sin" => "sinf",
                     "sqrt" => "sqrtf",
                     other => other,
                 }),

@@ -36,7 +36,7 @@ pub enum ExportError {
     },
     /// The file's extension says nothing of how to write it.
     #[error(
-        "cannot tell the format of {} (expected .glsl, .wgsl, .hlsl, .c or .binary, or a format)",
+        "cannot tell the format of {} (expected .glsl, .wgsl, .hlsl, .c, .binary, .bsdf or .py, or a format)",
         path.display()
     )]
     Format {
@@ -64,9 +64,26 @@ pub enum ExportError {
          glsl, wgsl, hlsl or c), or fit it without (fit --features highlight)"
     )]
     Anisotropic,
+    /// Channels that are neither colours nor a spectrum, or a spectrum for a file of colours.
+    #[error(
+        "expected channels that are red, green and blue by name{}, found {channels}",
+        spectra(*channels)
+    )]
+    Colours {
+        /// How many channels there are.
+        channels: usize,
+    },
     /// A model that is no network.
     #[error("only a network can be exported as source")]
     NoNetwork,
+}
+
+/// What else would do, in words.
+fn spectra(channels: usize) -> &'static str {
+    match channels {
+        1..=3 => "",
+        _ => ", or wavelengths such as '550 nm' and a file of spectra (--spectral)",
+    }
 }
 
 /// What may be moved, in words.

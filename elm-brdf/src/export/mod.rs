@@ -1,4 +1,5 @@
-//! Models for other programs: shader and C source with the network inside, and MERL tables.
+//! Models for other programs: shader and C source with the network inside, plug-ins of Mitsuba 3, and tables
+//! of the MERL and RGL databases.
 //!
 //! [`source`] writes one self-contained function that takes two directions in the surface's frame
 //! (unit vectors, the normal along $+z$, towards the light and towards the viewer) and returns the
@@ -6,9 +7,12 @@
 //! and never above the model's own ceiling. All its arithmetic is in single precision:
 //! standardisation is folded into the weights beforehand, in double precision. Sine, tangens
 //! hyperbolicus and arc tangent are its own, since shader languages leave the accuracy of theirs
-//! open, and output weights magnify what activations lose.
+//! open, and output weights magnify what activations lose. Beside it stand functions that draw a direction
+//! for a path tracer, and give the density of one: the [mixture of lobes](elm_datasets::mixture) that the
+//! renderer samples by.
 //!
-//! [`merl`] tabulates any model in the format of the MERL database.
+//! [`merl`] tabulates any model in the format of the MERL database, [`bsdf()`] as the tensor file that
+//! Mitsuba 3 and pbrt-v4 render; [`plugin`] writes a network as a plug-in of Mitsuba 3.
 //!
 //! ```
 //! use elm::{Activation, ElmParams, solve::Ridge};
@@ -30,11 +34,16 @@
 //! ```
 
 mod activations;
+mod bsdf;
 mod dialect;
 pub(crate) mod error;
 mod inputs;
+mod mitsuba;
 mod network;
+mod preamble;
 mod precision;
+mod sampler;
+mod spectrum;
 mod values;
 mod write;
 
@@ -43,10 +52,19 @@ use std::str::FromStr;
 
 use elm_datasets::merl::Merl;
 
+pub use bsdf::bsdf;
 pub use dialect::Language;
 pub use error::ExportError;
+pub use mitsuba::plugin;
 pub use precision::{SinglePrecision, check_precision};
+pub use spectrum::PRIMARIES;
 pub use write::{header, source};
+
+/// Source of `NAME_eval` alone, for what samples no directions.
+#[cfg(feature = "render")]
+pub(crate) fn evaluator(model: &BrdfModel, language: Language, name: &str) -> Result<String> {
+    write::evaluator(model, language, name, false)
+}
 
 use crate::error::{Error, Result};
 use crate::model::BrdfModel;
@@ -61,16 +79,22 @@ pub enum Format {
     Source(Language),
     /// A table in the format of the MERL database.
     Merl,
+    /// A tensor file of the RGL database, for Mitsuba 3 and pbrt-v4.
+    Bsdf,
+    /// A plug-in of Mitsuba 3, in Python.
+    Mitsuba,
 }
 
 impl Format {
     /// Every format there is.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 7] = [
         Self::Source(Language::Glsl),
         Self::Source(Language::Wgsl),
         Self::Source(Language::Hlsl),
         Self::Source(Language::C),
         Self::Merl,
+        Self::Bsdf,
+        Self::Mitsuba,
     ];
 
     /// The format's name.
@@ -79,10 +103,12 @@ impl Format {
         match self {
             Self::Source(language) => language.name(),
             Self::Merl => "merl",
+            Self::Bsdf => "bsdf",
+            Self::Mitsuba => "mitsuba",
         }
     }
 
-    /// The format that a file's extension asks for: its name, or `frag`, `vert`, `h`, `binary`.
+    /// The format that a file's extension asks for: its name, or `frag`, `vert`, `h`, `binary`, `py`.
     ///
     /// # Errors
     /// [`ExportError::Format`] for another extension.
@@ -95,6 +121,7 @@ impl Format {
             "frag" | "vert" => Ok(Self::Source(Language::Glsl)),
             "h" => Ok(Self::Source(Language::C)),
             "binary" => Ok(Self::Merl),
+            "py" => Ok(Self::Mitsuba),
             name => name.parse().map_err(|_| unknown()),
         }
     }

@@ -4,7 +4,7 @@
 use super::error::ExportError;
 use crate::features::Features;
 use crate::model::BrdfModel;
-use crate::target_transform::Channel;
+use crate::target_transform::{Channel, FittedTransform};
 
 /// A model ready to be written.
 pub(super) struct Network {
@@ -161,6 +161,54 @@ impl Network {
                 })
                 .collect::<Result<_, ExportError>>()?,
         })
+    }
+
+    /// Puts the channels at `places` in this order, in place of all outputs. Channels that are combinations
+    /// of fewer outputs have outputs of their own then.
+    pub(super) fn select(
+        &mut self,
+        transform: &FittedTransform,
+        places: &[usize],
+    ) -> Result<(), ExportError> {
+        let weights = |outputs: &[f64], place: usize| match transform.basis() {
+            Some(basis) => {
+                let axis = basis.axes().column(place);
+                outputs.iter().zip(axis).map(|(o, a)| o * a).sum()
+            }
+            None => outputs[place],
+        };
+        let mean = |place: usize| transform.basis().map_or(0.0, |basis| basis.mean()[place]);
+        let of_channels =
+            |outputs: Vec<f64>| places.iter().map(|&p| weights(&outputs, p)).collect();
+        let doubles = |singles: &[f32]| singles.iter().map(|&s| f64::from(s)).collect::<Vec<f64>>();
+        for neuron in &mut self.neurons {
+            let beta: Vec<f64> = of_channels(doubles(&neuron.beta));
+            neuron.beta = singles("an output weight", &beta)?;
+        }
+        let constants: Vec<f32> = self.outputs.iter().map(|output| output.constant).collect();
+        let constants: Vec<f64> = of_channels(doubles(&constants));
+        let mut linear = vec![vec![0.0; self.inputs.len()]; places.len()];
+        for input in 0..self.inputs.len() {
+            let own: Vec<f32> = self.outputs.iter().map(|o| o.linear[input]).collect();
+            let own: Vec<f64> = of_channels(doubles(&own));
+            for (row, weight) in linear.iter_mut().zip(own) {
+                row[input] = weight;
+            }
+        }
+        self.outputs = places
+            .iter()
+            .zip(constants)
+            .zip(&linear)
+            .map(|((&place, constant), linear)| {
+                Ok(Output {
+                    constant: single("an intercept", constant + mean(place))?,
+                    linear: singles("a direct link", linear)?,
+                })
+            })
+            .collect::<Result<_, ExportError>>()?;
+        let transforms = transform.by_channel();
+        self.values = Values::Direct(places.iter().map(|&place| transforms[place]).collect());
+        Ok(())
     }
 }
 

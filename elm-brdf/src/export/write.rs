@@ -6,13 +6,14 @@ use super::activations;
 use super::dialect::Language;
 use super::error::ExportError;
 use super::inputs;
-use super::network::{Network, Neuron, Values};
-use super::precision;
+use super::network::{Network, Neuron};
+use super::{preamble, precision, sampler};
 use crate::error::{Error, Result};
 use crate::model::BrdfModel;
 use elm_datasets::Brdf;
+use elm_datasets::mixture::LobeMixture;
 
-/// Source of the function `NAME_eval`, with everything that it needs.
+/// Source of the functions `NAME_eval`, `NAME_pdf` and `NAME_sample`, with everything that they need.
 ///
 /// | language | the function |
 /// |---|---|
@@ -20,6 +21,11 @@ use elm_datasets::Brdf;
 /// | WGSL | `fn NAME_eval(light: vec3<f32>, viewer: vec3<f32>) -> vec3<f32>` |
 /// | HLSL | `float3 NAME_eval(float3 light, float3 viewer)` |
 /// | C | `void NAME_eval(const float light[3], const float viewer[3], float rgb[3])` |
+///
+/// `NAME_pdf` of the same directions is the density in solid angle with which `NAME_sample` finds the light
+/// for a viewer, from two uniform numbers: `vec4 NAME_sample(vec3 viewer, vec2 u)`, the light and its
+/// density; in C `float NAME_sample(const float viewer[3], const float u[2], float light[3])`, the density.
+/// It is that of [`LobeMixture::of`].
 ///
 /// Three channels that are called by colours or wavelengths are red, green and blue by that,
 /// whatever their order. Of a spectrum it is the [colour](elm_datasets::color).
@@ -30,6 +36,19 @@ use elm_datasets::Brdf;
 /// ([`check_precision`](super::check_precision)); [`Error::Channels`] for another number of channels
 /// than 1 or 3.
 pub fn source(model: &BrdfModel, language: Language, name: &str) -> Result<String> {
+    let mut out = evaluator(model, language, name, true)?;
+    let mixture = LobeMixture::of(&model.in_color()?)?;
+    sampler::write(language, name, &mixture, &mut out);
+    Ok(out)
+}
+
+/// As [`source`], of `NAME_eval` alone, or with a preamble that speaks of the others, too.
+pub(super) fn evaluator(
+    model: &BrdfModel,
+    language: Language,
+    name: &str,
+    is_sampled: bool,
+) -> Result<String> {
     check_name(name)?;
     let model = &model.in_color()?;
     let channels = model.channels();
@@ -44,7 +63,7 @@ pub fn source(model: &BrdfModel, language: Language, name: &str) -> Result<Strin
         network: &network,
         out: String::new(),
     };
-    writer.whole()?;
+    writer.whole(is_sampled)?;
     Ok(writer.out)
 }
 
@@ -53,14 +72,17 @@ pub fn source(model: &BrdfModel, language: Language, name: &str) -> Result<Strin
 #[must_use]
 pub fn header(source: &str, name: &str) -> String {
     let guard = format!("{}_EVAL_H", name.to_uppercase());
-    let public = format!("void {name}_eval(");
-    let own = format!("static inline void {name}_eval(");
-    // The function's declaration and its definition begin lines; nothing else does.
+    let public = ["void NAME_eval(", "float NAME_pdf(", "float NAME_sample("];
+    let public = public.map(|head| head.replace("NAME", name));
+    // The functions' declarations and their definitions begin lines; nothing else does.
     let body: Vec<String> = source
         .lines()
-        .map(|line| match line.strip_prefix(&public) {
-            Some(rest) => format!("{own}{rest}"),
-            None => line.to_owned(),
+        .map(|line| {
+            if public.iter().any(|head| line.starts_with(head)) {
+                format!("static inline {line}")
+            } else {
+                line.to_owned()
+            }
         })
         .collect();
     format!(
@@ -70,7 +92,7 @@ pub fn header(source: &str, name: &str) -> String {
 }
 
 /// A letter, then letters, digits and single underscores, as all the languages have it.
-fn check_name(name: &str) -> Result<(), ExportError> {
+pub(super) fn check_name(name: &str) -> Result<(), ExportError> {
     let good = name.starts_with(|c: char| c.is_ascii_alphabetic())
         && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
         && !name.contains("__")
@@ -84,11 +106,6 @@ fn check_name(name: &str) -> Result<(), ExportError> {
         })
     }
 }
-
-/// What a caller must know of a material with a grain.
-const TANGENT_NOTICE: &str = "\
-// The material has a grain: +x is the surface's tangent, +y its bitangent, as azimuths were measured.
-";
 
 /// The components of both directions, in the shaders' notation.
 const COMPONENTS: [(&str, &str); 6] = [
@@ -109,7 +126,8 @@ pub(super) struct Writer<'a> {
 }
 
 impl<'a> Writer<'a> {
-    fn whole(&mut self) -> Result<(), ExportError> {
+    fn whole(&mut self, is_sampled: bool) -> Result<(), ExportError> {
+        let network = self.network;
         let inputs: Vec<&str> = self
             .network
             .inputs
@@ -124,7 +142,7 @@ impl<'a> Writer<'a> {
             .collect();
         let components = inputs::needed(&COMPONENTS, &used);
 
-        self.preamble();
+        preamble::write(self.language, self.name, network, is_sampled, &mut self.out);
         if used.iter().any(|e| e.contains("ANGLE")) {
             self.angle();
         }
@@ -232,52 +250,6 @@ impl<'a> Writer<'a> {
             function.result,
         );
         Ok(())
-    }
-
-    /// What the file is.
-    fn preamble(&mut self) {
-        let Network {
-            inputs,
-            neurons,
-            values,
-            ..
-        } = self.network;
-        let mut kinds: Vec<&str> = neurons.iter().map(|n| n.activation.as_str()).collect();
-        kinds.dedup();
-        let _ = write!(
-            self.out,
-            "// {name}_eval: the BRDF of a material in 1/sr, as linear red, green and blue.\n\
-             // light, viewer: unit vectors from the surface, in its own frame with the normal\n\
-             // along +z. Black below the horizon.\n\
-             {grain}//\n\
-             // An extreme learning machine, written by elm-brdf {version}.\n\
-             // Neurons: {count}, {kinds}\n\
-             // Inputs: {inputs}\n\
-             // Channels: {channels}{spectrum}\n\n",
-            name = self.name,
-            version = env!("CARGO_PKG_VERSION"),
-            count = neurons.len(),
-            kinds = kinds.join(", "),
-            channels = values.count(),
-            spectrum = match values {
-                Values::Direct(_) => String::new(),
-                Values::Color(spectrum) => format!(
-                    ", linear sRGB of {} wavelengths under D65 (CIE 1931, 2 degrees)",
-                    spectrum.len()
-                ),
-            },
-            inputs = inputs.join("; "),
-            grain = if inputs.iter().any(|input| input.contains("phi_h")) {
-                TANGENT_NOTICE
-            } else {
-                ""
-            },
-        );
-        match self.language {
-            Language::Glsl => self.out.push_str("precision highp float;\n\n"),
-            Language::C => self.out.push_str("#include <math.h>\n\n"),
-            Language::Wgsl | Language::Hlsl => {}
-        }
     }
 
     /// The head of the function itself, and what is below the horizon.

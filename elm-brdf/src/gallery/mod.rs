@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::batch::Packed;
 use crate::error::{Error, Result};
-use crate::export::{Language, source};
+use crate::export::{Language, evaluator};
 use crate::file;
 use crate::fit::Model;
 use crate::model::BrdfModel;
@@ -156,7 +156,7 @@ fn card(item: &GalleryItem, picture: String) -> Result<Card> {
     } = item;
     let shown = model.in_color()?;
     let material = Material::new(Box::new(shown.clone()), [1.0; 3], false)?;
-    let glsl = source(model, Language::Glsl, "shown")?;
+    let glsl = evaluator(model, Language::Glsl, "shown")?;
     let groups = model.network().hidden().groups().iter();
     let neurons: Vec<String> = groups
         .map(|group| format!("{} {} neurons", group.neurons(), group.activation()))

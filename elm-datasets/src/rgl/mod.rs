@@ -41,8 +41,10 @@
 #![allow(clippy::doc_markdown)]
 
 mod azimuths;
+mod facets;
 mod tensor;
 mod warp;
+mod write;
 
 use std::f64::consts::{FRAC_2_PI, PI, TAU};
 use std::path::Path;
@@ -56,6 +58,7 @@ use crate::{Error, Samples, Sampling, file};
 use azimuths::Azimuths;
 use tensor::{F32, Field, U8};
 use warp::{Axis, Size, Warp};
+pub use write::{Encoded, WriteError, encode};
 
 /// The channels of a file.
 #[derive(Debug, Clone, PartialEq)]

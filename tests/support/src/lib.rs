@@ -83,3 +83,20 @@ fn in_path(name: &str) -> Option<PathBuf> {
         .map(|dir| dir.join(format!("{name}{}", std::env::consts::EXE_SUFFIX)))
         .find(|path| path.is_file())
 }
+
+/// A Python with Mitsuba 3: the one that `ELM_BRDF_MITSUBA` names, or `python3`.
+#[must_use]
+pub fn mitsuba() -> Option<PathBuf> {
+    let named = std::env::var_os("ELM_BRDF_MITSUBA").map(PathBuf::from);
+    let python = named.unwrap_or_else(|| PathBuf::from("python3"));
+    let mut program = std::process::Command::new(&python);
+    program.args([
+        "-c",
+        "import numpy, mitsuba; mitsuba.set_variant('llvm_ad_rgb'); print(mitsuba.Float(0) + 1)",
+    ]);
+    let runs = program.output().is_ok_and(|found| found.status.success());
+    if !runs {
+        skip("a Python with Mitsuba 3 and LLVM, in ELM_BRDF_MITSUBA");
+    }
+    runs.then_some(python)
+}

@@ -1,10 +1,28 @@
-//! Samples directions about in proportion to a model, by a mixture of a few lobes.
+//! Samples directions about in proportion to a model, by a mixture of a few [lobes](Lobe) in closed form.
+//!
+//! ```
+//! use elm_datasets::{Brdf, geometry::{DirectionPair, cartesian}, lobes::Formula, mixture::LobeMixture};
+//!
+//! let plastic = Formula::lambert(0.5)?.with_ggx(0.04, 0.1)?;
+//! let mixture = LobeMixture::of(&plastic)?;
+//! let outgoing = cartesian(0.8, 0.3);
+//! let (incident, density) = mixture.sample(outgoing, [0.3, 0.7]);
+//! assert!((mixture.density(outgoing, incident) / density - 1.0).abs() < 1e-12);
+//! // What a path tracer multiplies light by: about the albedo, wherever the direction falls.
+//! let value = plastic.eval(&[DirectionPair { incident, outgoing }])?[[0, 0]];
+//! assert!((0.1..1.5).contains(&(value * incident[2] / density)));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod lobe;
+mod search;
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use crate::lobe::Lobe;
-use crate::random::{Purpose, numbers, pixel_seed};
-use elm_datasets::geometry::{DirectionPair, Vector, cartesian};
+use crate::brdf::{Brdf, EvalError};
+use crate::geometry::{DirectionPair, Vector, cartesian};
+pub use lobe::Lobe;
+use search::Problem;
 
 /// Roughnesses of the GGX lobes that are tried.
 const GLOSSY: [f64; 6] = [0.01, 0.025, 0.06, 0.12, 0.25, 0.5];
@@ -32,12 +50,10 @@ const LEAST: [f64; 2] = [0.07, 0.03];
 /// Multiples of this angle fill the circle evenly.
 const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 /// Coefficients of a weight as a polynomial in the viewer's cosine.
-const TERMS: usize = 4;
+pub const TERMS: usize = 4;
 /// Steps of the search for the weights, with all lobes and after each that is left out.
 const STEPS: usize = 40;
 const STEPS_AFTER: usize = 8;
-/// Rounds of the search for widths and tilts.
-const ROUNDS: usize = 4;
 
 /// Bernstein's polynomials at the viewer's cosine: not negative, with sum 1.
 fn terms(cosine: f64) -> [f64; TERMS] {
@@ -51,15 +67,16 @@ fn terms(cosine: f64) -> [f64; TERMS] {
 ///
 /// Lobes are symmetric in the azimuth about the viewer or, of a model that is not isotropic, about a
 /// direction of the surface; where the model is not, the density stays a density, and only the noise grows.
-#[derive(Debug, Clone)]
-pub(crate) struct LobeMixture {
+#[derive(Debug, Clone, PartialEq)]
+pub struct LobeMixture {
     /// Those of [`LEAST`] first.
     lobes: Vec<(Lobe, [f64; TERMS])>,
 }
 
 /// Directions at which a model is asked, each with the solid angle that it stands for.
-pub(crate) struct Points {
-    pub(crate) pairs: Vec<DirectionPair>,
+#[derive(Debug, Clone)]
+pub struct Points {
+    pairs: Vec<DirectionPair>,
     weights: Vec<f64>,
 }
 
@@ -72,14 +89,20 @@ impl Points {
             for index in 0..count {
                 // From every side, for a model that is not isotropic.
                 let outgoing = cartesian(view_angle(view), f64::from(index) * GOLDEN_ANGLE);
-                let seed = pixel_seed(0, view as u32);
-                let [a, b, ..] = numbers(seed, index, Purpose::Scatter(0));
-                let (incident, density) = mixture.sample(outgoing, [a, b]);
+                // Each angle has a stretch of the sequence of its own.
+                let numbers = low_discrepancy(view as u32 * count + index);
+                let (incident, density) = mixture.sample(outgoing, numbers);
                 pairs.push(DirectionPair { incident, outgoing });
                 weights.push(1.0 / (density * f64::from(count)));
             }
         }
         Self { pairs, weights }
+    }
+
+    /// The pairs of directions.
+    #[must_use]
+    pub fn pairs(&self) -> &[DirectionPair] {
+        &self.pairs
     }
 
     fn densities(&self, lobe: Lobe) -> Vec<f64> {
@@ -89,8 +112,9 @@ impl Points {
             .collect()
     }
 
-    /// Directional albedo at each viewing angle (theta_o in radians, albedo) by the values at all pairs.
-    pub(crate) fn albedo(&self, values: &[f64]) -> Vec<(f64, f64)> {
+    /// Directional albedo at each viewing angle (`theta_o` in radians, albedo) by the values at all pairs.
+    #[must_use]
+    pub fn albedo(&self, values: &[f64]) -> Vec<(f64, f64)> {
         let count = self.pairs.len() / VIEWS;
         let all = self.pairs.iter().zip(&self.weights).zip(values);
         let parts: Vec<f64> = all
@@ -102,6 +126,13 @@ impl Points {
             .map(|(view, parts)| (view_angle(view), parts.iter().sum()))
             .collect()
     }
+}
+
+/// Two numbers in \[0, 1): M. Roberts's R2 sequence, multiples of the inverse of the root of
+/// $x^3 = x + 1$ and of its square.
+fn low_discrepancy(index: u32) -> [f64; 2] {
+    const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
+    STEPS.map(|step| (0.5 + step * f64::from(index)).fract())
 }
 
 fn view_angle(view: usize) -> f64 {
@@ -137,14 +168,39 @@ impl LobeMixture {
         }
     }
 
+    /// The mixture of a model, by the mean of its channels. Asks it at 8,192 pairs, at 32,768 if it is not
+    /// isotropic.
+    ///
+    /// # Errors
+    /// Those of the model's own evaluation.
+    pub fn of(brdf: &dyn Brdf) -> Result<Self, EvalError> {
+        let isotropic = brdf.is_isotropic();
+        let points = Self::pilot(isotropic);
+        let values = brdf.eval(&points.pairs)?;
+        let safe = |value: f64| {
+            if value.is_finite() {
+                value.max(0.0)
+            } else {
+                0.0
+            }
+        };
+        let rows = values.rows().into_iter();
+        let values: Vec<f64> = rows
+            .map(|row| row.iter().copied().map(safe).sum())
+            .collect();
+        Ok(Self::fit(&points, &values, isotropic))
+    }
+
     /// Where a model is asked before anything is known of it.
-    pub(crate) fn pilot(isotropic: bool) -> Points {
+    #[must_use]
+    pub fn pilot(isotropic: bool) -> Points {
         let count = if isotropic { PILOT } else { PILOT_DIRECTED };
         Points::of(&Self::candidates(isotropic), count)
     }
 
     /// Mirror and retro-reflection at each viewing angle, where models peak.
-    pub(crate) fn peaks() -> Vec<DirectionPair> {
+    #[must_use]
+    pub fn peaks() -> Vec<DirectionPair> {
         let peaks = |view| {
             let outgoing = cartesian(view_angle(view), 0.0);
             [PI, 0.0].map(|phi| DirectionPair {
@@ -156,13 +212,15 @@ impl LobeMixture {
     }
 
     /// Where this mixture asks a model.
-    pub(crate) fn points(&self) -> Points {
+    #[must_use]
+    pub fn points(&self) -> Points {
         Points::of(self, FINAL)
     }
 
     /// The mixture with the least variance of $f \cos\theta_i$ over its density, by the model's values,
     /// finite and not negative, at the pairs of [`pilot`](Self::pilot).
-    pub(crate) fn fit(points: &Points, values: &[f64], isotropic: bool) -> Self {
+    #[must_use]
+    pub fn fit(points: &Points, values: &[f64], isotropic: bool) -> Self {
         let mut mixture = Self::candidates(isotropic);
         let mut problem = Problem::new(&mixture, points, values);
         problem.improve(&mut mixture, STEPS);
@@ -219,6 +277,13 @@ impl LobeMixture {
         }
     }
 
+    /// The lobes, each with the coefficients of its weight: of $(1-x)^3$, $3 (1-x)^2 x$, $3 (1-x) x^2$ and
+    /// $x^3$ with $x$ the viewer's cosine.
+    #[must_use]
+    pub fn lobes(&self) -> &[(Lobe, [f64; TERMS])] {
+        &self.lobes
+    }
+
     /// The lobes with their shares for a viewer.
     fn shares(&self, outgoing: Vector) -> impl Iterator<Item = (Lobe, f64)> {
         let terms = terms(outgoing[2]);
@@ -241,15 +306,18 @@ impl LobeMixture {
         chosen
     }
 
-    /// An incident direction for a viewer at `outgoing`, with its density in solid angle.
-    pub(crate) fn sample(&self, outgoing: Vector, [a, b]: [f64; 2]) -> (Vector, f64) {
+    /// An incident direction for a viewer at `outgoing`, from two numbers in \[0, 1), with its density in
+    /// solid angle.
+    #[must_use]
+    pub fn sample(&self, outgoing: Vector, [a, b]: [f64; 2]) -> (Vector, f64) {
         let (lobe, a) = self.choose(outgoing, a);
         let incident = lobe.sample(outgoing, [a, b]);
         (incident, self.density(outgoing, incident))
     }
 
     /// The density in solid angle with which [`sample`](Self::sample) finds `incident`.
-    pub(crate) fn density(&self, outgoing: Vector, incident: Vector) -> f64 {
+    #[must_use]
+    pub fn density(&self, outgoing: Vector, incident: Vector) -> f64 {
         if incident[2].is_nan() || incident[2] <= 0.0 {
             return 0.0;
         }
@@ -257,137 +325,6 @@ impl LobeMixture {
             .shares(outgoing)
             .map(|(lobe, share)| share * lobe.density(outgoing, incident));
         parts.sum()
-    }
-}
-
-/// The search for weights: the least sum over viewing angles of the logarithm of the second moment of
-/// $f \cos\theta_i$ over the density.
-struct Problem {
-    /// Of each lobe at each point.
-    densities: Vec<Vec<f64>>,
-    /// The square of f cos theta_i at each point, times its solid angle.
-    squares: Vec<f64>,
-    terms: Vec<[f64; TERMS]>,
-}
-
-impl Problem {
-    fn new(mixture: &LobeMixture, points: &Points, values: &[f64]) -> Self {
-        let all = points.pairs.iter().zip(&points.weights).zip(values);
-        // The size of values does not matter, and squares of large ones are no numbers.
-        let largest = values.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-        Self {
-            densities: mixture
-                .lobes
-                .iter()
-                .map(|(lobe, _)| points.densities(*lobe))
-                .collect(),
-            squares: all
-                .map(|((pair, weight), value)| {
-                    (value / largest * pair.incident[2]).powi(2) * weight
-                })
-                .collect(),
-            terms: (0..VIEWS)
-                .map(|view| terms(view_angle(view).cos()))
-                .collect(),
-        }
-    }
-
-    /// Density of the mixture at each point of a view, without one lobe if that is asked.
-    fn mixed(&self, mixture: &LobeMixture, view: usize, without: Option<usize>) -> Vec<f64> {
-        let count = self.squares.len() / VIEWS;
-        let mut mixed = vec![0.0; count];
-        let mut total = 0.0;
-        for (lobe, (_, weights)) in mixture.lobes.iter().enumerate() {
-            if without == Some(lobe) {
-                continue;
-            }
-            let share: f64 = weights
-                .iter()
-                .zip(self.terms[view])
-                .map(|(w, t)| w * t)
-                .sum();
-            total += share;
-            let densities = &self.densities[lobe][view * count..(view + 1) * count];
-            for (sum, density) in mixed.iter_mut().zip(densities) {
-                *sum += share * density;
-            }
-        }
-        for density in &mut mixed {
-            *density = (*density / total).max(f64::MIN_POSITIVE);
-        }
-        mixed
-    }
-
-    fn objective(&self, mixture: &LobeMixture, without: Option<usize>) -> f64 {
-        let count = self.squares.len() / VIEWS;
-        let moment = |view: usize| -> f64 {
-            let squares = &self.squares[view * count..(view + 1) * count];
-            let mixed = self.mixed(mixture, view, without);
-            squares.iter().zip(&mixed).map(|(s, p)| s / p).sum()
-        };
-        let moments = (0..VIEWS).map(moment).filter(|&m| m > 0.0);
-        moments.map(f64::ln).sum()
-    }
-
-    /// Takes widths and tilts between those tried.
-    fn refine(&mut self, points: &Points, mixture: &mut LobeMixture) {
-        let mut factor = 1.25_f64;
-        for _ in 0..ROUNDS {
-            let mut best = self.objective(mixture, None);
-            for index in LEAST.len()..mixture.lobes.len() {
-                for lobe in mixture.lobes[index].0.variations(factor) {
-                    let before = mixture.lobes[index].0;
-                    mixture.lobes[index].0 = lobe;
-                    let densities =
-                        std::mem::replace(&mut self.densities[index], points.densities(lobe));
-                    let found = self.objective(mixture, None);
-                    if found < best {
-                        best = found;
-                    } else {
-                        mixture.lobes[index].0 = before;
-                        self.densities[index] = densities;
-                    }
-                }
-            }
-            self.improve(mixture, STEPS_AFTER);
-            factor = factor.sqrt();
-        }
-    }
-
-    /// Steps that cannot make the sum larger: with r the share of a lobe in the density, s / p is at most
-    /// the sum of r^2 s / (w p_lobe) for any other weights w, which is least for w as the root of its
-    /// coefficient.
-    fn improve(&mut self, mixture: &mut LobeMixture, steps: usize) {
-        let count = self.squares.len() / VIEWS;
-        for _ in 0..steps {
-            let mut gains = vec![[0.0; TERMS]; mixture.lobes.len()];
-            for view in 0..VIEWS {
-                let squares = &self.squares[view * count..(view + 1) * count];
-                let mixed = self.mixed(mixture, view, None);
-                let moment: f64 = squares.iter().zip(&mixed).map(|(s, p)| s / p).sum();
-                if moment.is_nan() || moment <= 0.0 {
-                    continue;
-                }
-                let ratios: Vec<f64> = squares
-                    .iter()
-                    .zip(&mixed)
-                    .map(|(s, p)| s / (p * p))
-                    .collect();
-                for (gain, densities) in gains.iter_mut().zip(&self.densities) {
-                    let densities = &densities[view * count..(view + 1) * count];
-                    let sum: f64 = densities.iter().zip(&ratios).map(|(d, r)| d * r).sum();
-                    for (gain, term) in gain.iter_mut().zip(self.terms[view]) {
-                        *gain += sum / moment * term;
-                    }
-                }
-            }
-            for ((_, weights), gain) in mixture.lobes.iter_mut().zip(&gains) {
-                for (weight, gain) in weights.iter_mut().zip(gain) {
-                    *weight *= gain.sqrt();
-                }
-            }
-            mixture.normalize();
-        }
     }
 }
 

@@ -2,8 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::vector::ShadingFrame;
-use elm_datasets::geometry::{Vector, dot};
+use crate::geometry::{Vector, dot, tangents};
 
 /// Between which widths in radians and roughnesses are.
 const WIDTHS: (f64, f64) = (0.005, 4.0);
@@ -12,12 +11,16 @@ const MAX_TILT: f64 = 0.95;
 
 /// A density of directions in closed form. What falls below the horizon is reflected upwards.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Lobe {
+#[non_exhaustive]
+pub enum Lobe {
+    /// In proportion to the cosine of the angle from the normal.
     Cosine,
+    /// All directions alike.
     Uniform,
     /// The cosine's disc moved towards the mirror direction, or with a negative factor towards the viewer, by
     /// a conformal map of the disc onto itself.
     Tilted {
+        /// How far, from -1 to 1: the middle of the disc goes there times the sine of the viewer's angle.
         factor: f64,
     },
     /// The viewer reflected at normals of the GGX distribution that are visible to it: its highlight grows
@@ -31,7 +34,9 @@ pub(crate) enum Lobe {
     /// As round at every angle, about the mirror direction or the viewer: in proportion to
     /// $(s + 1 - \cos\delta)^{-2}$ with $\delta$ the angle to its axis and $s$ half the square of its width.
     Round {
+        /// In radians.
         width: f64,
+        /// Whether about the viewer, not the mirror direction.
         retro: bool,
     },
 }
@@ -43,7 +48,8 @@ fn below([x, y, z]: Vector) -> Vector {
 
 impl Lobe {
     /// Density in solid angle at `incident`, above the horizon.
-    pub(crate) fn density(self, outgoing: Vector, incident: Vector) -> f64 {
+    #[must_use]
+    pub fn density(self, outgoing: Vector, incident: Vector) -> f64 {
         let [x, y, z] = outgoing;
         match self {
             Self::Cosine => incident[2] / PI,
@@ -72,14 +78,19 @@ impl Lobe {
             Self::Round { width, retro } => {
                 let s = width * width / 2.0;
                 let axis = if retro { outgoing } else { [-x, -y, z] };
-                let about = |to: Vector| (s + 1.0 - dot(axis, to)).powi(-2);
+                // 1 - cos delta as half the square of a chord, which keeps its digits for a small one.
+                let about = |to: Vector| {
+                    let chord = [0, 1, 2].map(|k| axis[k] - to[k]);
+                    (s + dot(chord, chord) / 2.0).powi(-2)
+                };
                 s * (s + 2.0) / (2.0 * TAU) * (about(incident) + about(below(incident)))
             }
         }
     }
 
     /// An incident direction for two uniform numbers.
-    pub(crate) fn sample(self, outgoing: Vector, [a, b]: [f64; 2]) -> Vector {
+    #[must_use]
+    pub fn sample(self, outgoing: Vector, [a, b]: [f64; 2]) -> Vector {
         let (sin, cos) = (TAU * a).sin_cos();
         let [x, y, z] = outgoing;
         let found = match self {
@@ -97,19 +108,21 @@ impl Lobe {
                 let size = below.0 * below.0 + below.1 * below.1;
                 let re = (above.0 * below.0 + above.1 * below.1) / size;
                 let im = (above.1 * below.0 - above.0 * below.1) / size;
-                [re, im, (1.0 - re * re - im * im).max(0.0).sqrt()]
+                // 1 - |.|^2, which would be lost next to the horizon.
+                let left = (1.0 - w.0 * w.0 - w.1 * w.1) * (1.0 - b) / size;
+                [re, im, left.max(0.0).sqrt()]
             }
             Self::Ggx { alpha, turn } => {
                 // A cap of the sphere, as the stretched surface shows it (Dupuy and Benyoub, 2023).
                 let outgoing = about_normal(outgoing, -turn);
                 let [x, y, z] = outgoing;
                 let stretched = unit([alpha[0] * x, alpha[1] * y, z]);
-                let height = (1.0 - b) * (1.0 + stretched[2]) - stretched[2];
-                let radius = (1.0 - height * height).max(0.0).sqrt();
+                let below_pole = b * (1.0 + stretched[2]);
+                let radius = (below_pole * (2.0 - below_pole)).max(0.0).sqrt();
                 let normal = unit([
                     alpha[0] * (radius * cos + stretched[0]),
                     alpha[1] * (radius * sin + stretched[1]),
-                    (height + stretched[2]).max(0.0),
+                    (1.0 - b) * (1.0 + stretched[2]),
                 ]);
                 let along = 2.0 * dot(outgoing, normal);
                 let reflected = [0, 1, 2].map(|k| along * normal[k] - outgoing[k]);
@@ -120,8 +133,10 @@ impl Lobe {
                 let off = 2.0 * b * s / (s + 2.0 * (1.0 - b));
                 let radius = (off * (2.0 - off)).max(0.0).sqrt();
                 let axis = if retro { outgoing } else { [-x, -y, z] };
-                let frame = ShadingFrame::from_normal(axis.into());
-                frame.world([radius * cos, radius * sin, 1.0 - off]).into()
+                let [tangent, bitangent] = tangents(axis);
+                [0, 1, 2].map(|k| {
+                    radius * (cos * tangent[k] + sin * bitangent[k]) + (1.0 - off) * axis[k]
+                })
             }
         };
         let [x, y, z] = unit(found);
@@ -129,7 +144,7 @@ impl Lobe {
     }
 
     /// The same with its width or tilt times a factor and divided by it, and with its direction turned.
-    pub(crate) fn variations(self, factor: f64) -> Vec<Self> {
+    pub(super) fn variations(self, factor: f64) -> Vec<Self> {
         let wider = |width: f64, factor: f64| (width * factor).clamp(WIDTHS.0, WIDTHS.1);
         let rougher = |alpha: f64, factor: f64| wider(alpha, factor).min(1.0);
         let both = [factor, 1.0 / factor];
@@ -209,8 +224,8 @@ fn unit(v: Vector) -> Vector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::{Purpose, numbers, pixel_seed};
-    use elm_datasets::geometry::cartesian;
+    use crate::geometry::cartesian;
+    use crate::mixture::low_discrepancy;
     use std::f64::consts::FRAC_PI_2;
 
     const LOBES: [Lobe; 11] = [
@@ -282,14 +297,13 @@ mod tests {
                 let mut counts = vec![0.0; 64];
                 let draws = 16384;
                 for index in 0..draws {
-                    let [a, b, ..] = numbers(pixel_seed(3, 1), index, Purpose::Scatter(1));
-                    let w = lobe.sample(outgoing, [a, b]);
+                    let w = lobe.sample(outgoing, low_discrepancy(index));
                     let row = (w[2].acos() / FRAC_PI_2 * 8.0) as usize;
                     let column = (w[1].atan2(w[0]).rem_euclid(TAU) / TAU * 8.0) as usize;
                     counts[row.min(7) * 8 + column.min(7)] += 1.0 / f64::from(draws);
                 }
                 for (count, part) in counts.iter().zip(&parts) {
-                    // Five deviations of independent draws; Sobol's have less.
+                    // Five deviations of independent draws; an even sequence has less.
                     let deviation = (part / f64::from(draws)).sqrt();
                     let bound = 5.0 * deviation + 2e-3 * part + 1.0 / f64::from(draws);
                     assert!(
