@@ -39,7 +39,7 @@ def chi_square(material, what, description):
         wi = [float(np.sin(theta) * np.cos(phi)), float(np.sin(theta) * np.sin(phi)), float(np.cos(theta))]
         sample, pdf = BSDFAdapter(description['type'], description, wi=wi)
         # Highlights narrower than a bin ask for finer integrals.
-        test = ChiSquareTest(SphericalDomain(), sample, pdf, sample_dim=3, ires=8, res=101)
+        test = ChiSquareTest(SphericalDomain(), sample, pdf, sample_dim=3, ires=32, res=101)
         passed = test.run(significance_level=0.01, test_count=len(ANGLES), quiet=True)
         say(material=material, what=f'{what} chi-square', angle=angle, passed=bool(passed), p=float(test.p_value),
             pdf=float(dr.sum(test.pdf)[0] if dr.is_array_v(dr.sum(test.pdf)) else dr.sum(test.pdf)) / test.sample_count)
