@@ -12,7 +12,7 @@
 //!
 //! // Two half circles.
 //! let x = Array2::from_shape_fn((60, 2), |(i, j)| {
-//!     let (angle, upper) = (i as f64 * 0.11, i % 2 == 0);
+//!     let (angle, upper) = (i as f64 * 0.053, i % 2 == 0);
 //!     match (j, upper) {
 //!         (0, true) => angle.cos(),
 //!         (0, false) => 1.0 - angle.cos(),
