@@ -14,6 +14,7 @@ mod normal_equations;
 mod outputs;
 mod problem;
 mod rows;
+mod size;
 mod small_data;
 
 use elm::advanced::FeatureMap;
@@ -23,7 +24,7 @@ use elm_datasets::brdf::{EvalError, check_arguments};
 use ndarray::{Array1, Array2, ArrayView2, ArrayViewMut2, Axis, Slice};
 
 use super::{BrdfModel, Draw, Provenance};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::features::Features;
 use crate::fit::{Fit, Model, check};
 use crate::metrics::Metric;
@@ -35,6 +36,7 @@ use elm_datasets::Brdf;
 use elm_datasets::geometry::DirectionPair;
 use finish::Finished;
 use problem::Problem;
+use size::Width;
 
 /// Fits a network and chooses what is left open: inputs, the scale of each input, regularisation,
 /// and, of many neurons drawn, which to keep.
@@ -241,60 +243,6 @@ impl Tuned {
         }
     }
 
-    /// The most numbers to be stored: what is asked for, or what was measured, or of many half of it;
-    /// `None` where the neurons are given and the numbers are not.
-    fn most_floats(&self, rows: usize, channels: usize) -> Option<usize> {
-        let measured = rows * channels;
-        let warranted = if measured > 1000 {
-            measured / 2
-        } else {
-            measured
-        };
-        match (self.max_floats, self.neurons) {
-            (None, None) => Some(warranted),
-            (asked, _) => asked,
-        }
-    }
-
-    /// The neurons that the limits allow, or `usual`. `drawn` says how many are drawn for so many to be
-    /// kept, which of them being a bit each.
-    fn size(
-        &self,
-        usual: usize,
-        rows: usize,
-        inputs: usize,
-        Width { channels, outputs }: Width,
-        drawn: impl Fn(usize) -> usize,
-    ) -> Result<usize> {
-        let wanted = self.neurons.unwrap_or(usual);
-        let Some(most) = self.most_floats(rows, channels) else {
-            return Ok(wanted);
-        };
-        // Of fewer outputs than channels a mean, and a part of every axis, of each channel.
-        let basis = if outputs < channels { 1 + outputs } else { 0 };
-        // Mean, factor and scale of each input; constant of each output, transform of each channel.
-        let fixed = 3 * inputs + outputs + channels * (2 + basis);
-        let floats = |neurons: usize| fixed + outputs * neurons + drawn(neurons).div_ceil(32);
-        let largest = match (self.neurons, self.max_floats) {
-            (Some(neurons), _) => neurons,
-            (None, Some(most)) => most / outputs,
-            (None, None) => usual,
-        };
-        let found = (1..=largest).rev().find(|&neurons| floats(neurons) <= most);
-        // Of few measurements the scales leave nothing: one neuron for each then.
-        let least = rows.min(Self::FEWEST).min(usual);
-        match (found, self.max_floats) {
-            (Some(neurons), None) if self.neurons.is_none() => Ok(neurons.max(least)),
-            (Some(neurons), _) => Ok(neurons),
-            (None, None) => Ok(least),
-            (None, Some(_)) => Err(Error::Parameter {
-                name: "max_floats",
-                value: most as f64,
-                expected: "enough for input scales, one neuron and a few numbers for each channel: about 20 or more",
-            }),
-        }
-    }
-
     /// Sine neurons of normal frequencies at three scales: heavier tails than one scale has.
     fn sine_features(&self, neurons: usize, input_scales: &[f64]) -> ElmParams<f64> {
         let third = neurons / 3;
@@ -371,22 +319,6 @@ impl Model for SideBySide {
             .map(Model::floats_per_channel)
             .max()
             .unwrap_or(0)
-    }
-}
-
-/// How many channels values have, and how many outputs a network has for them.
-#[derive(Clone, Copy)]
-struct Width {
-    channels: usize,
-    outputs: usize,
-}
-
-impl Width {
-    fn of(transform: &FittedTransform) -> Self {
-        Self {
-            channels: transform.channels(),
-            outputs: transform.outputs(),
-        }
     }
 }
 
