@@ -6,5 +6,6 @@ pub mod networks;
 pub mod peaks;
 pub mod peers;
 pub mod stress;
+pub mod tables;
 pub mod timing;
 pub mod topics;

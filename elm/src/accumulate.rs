@@ -121,13 +121,13 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
     /// all accumulators that are to be merged.
     ///
     /// # Errors
-    /// [`Error::Conflict`] when the parameters switch standardization off, lay biases or centers on the data
-    /// or ask for the solver [`Inverse`](crate::solve::Inverse); [`Error::Parameter`] for 0
+    /// [`Error::Conflict`] when the parameters switch standardization off, lay biases, centers or ramps on
+    /// the data or ask for the solver [`Inverse`](crate::solve::Inverse); [`Error::Parameter`] for 0
     /// outputs; [`Error::Shape`] for input scales; [`Error::TooLarge`].
     pub fn with_scaler(params: &ElmParams<A>, scaler: Scaler<A>, outputs: usize) -> Result<Self> {
         if params.feature_map().needs_rows() {
             return Err(Error::Conflict {
-                first: "biases or centers on the data",
+                first: "biases, centers or ramps on the data",
                 second: "a layer drawn before there are rows",
             });
         }
@@ -151,18 +151,13 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
         }
         check_length("columns of inputs", x.ncols(), scaler.mean().len())?;
         let map = params.feature_map();
-        let layer = map.draw_layer(x.view(), Some(&scaler), None)?;
-        let links = params.direct_links();
-        Self::new(
-            params,
-            FeatureMap::of_checked(Some(scaler), layer, links),
-            outputs,
-        )
+        let map = map.draw_scaled(x.view(), Some(scaler), None)?;
+        Self::new(params, map, outputs)
     }
 
     /// Draws the random layer for rows like those of `x`, shape (rows, inputs): inputs are
     /// standardized by their means and deviations, and biases laid on them, where the parameters
-    /// say so. The rows are not pushed. One sample gives accumulators that can be merged. Rows unlike
+    /// say so, and ramps lie between their quantiles. The rows are not pushed. One sample gives accumulators that can be merged. Rows unlike
     /// the sample are refused; see [`push`](Self::push).
     ///
     /// # Errors
@@ -367,6 +362,7 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
         for (what, same) in [
             ("random layers", self.map.layer() == other.map.layer()),
             ("scalers of inputs", self.map.scaler() == other.map.scaler()),
+            ("ramps of inputs", self.map.ramps() == other.map.ramps()),
             ("numbers of outputs", self.outputs == other.outputs),
             (
                 "direct links",

@@ -90,7 +90,9 @@ pub use bounds::Bounds;
 pub use classify::ElmClassifier;
 pub use dataset::{Dataset, Inputs, TargetDim, Targets};
 pub use error::{Error, Result};
-pub use feature_map::{Biases, Distribution, NeuronGroup, NodeType, Scaler, ScalerBuilder};
+pub use feature_map::{
+    Biases, Distribution, Embedding, NeuronGroup, NodeType, Ramps, Scaler, ScalerBuilder,
+};
 pub use linalg::backend;
 pub use model::ElmParams;
 pub use ndarray;

@@ -194,9 +194,8 @@ impl<A: Scalar, D: TargetDim> Elm<A, D> {
             beta_norm: beta.columns().into_iter().map(norm).collect(),
             ..first.diagnosis.clone()
         };
-        let map = &first.map;
         Self {
-            map: FeatureMap::of_checked(map.scaler().cloned(), hidden, map.direct_links()),
+            map: first.map.with_layer(hidden),
             beta,
             intercept,
             diagnosis,
@@ -240,8 +239,8 @@ impl<A: Scalar, D: TargetDim> Elm<A, D> {
     }
 
     /// The hidden-layer matrix of these inputs (the paper's $F$, equation 9): shape (rows, inputs)
-    /// to (rows, neurons), followed by the standardized inputs where they are linked directly. Inputs
-    /// have been held to their [`bounds`](Self::bounds).
+    /// to (rows, neurons), followed by what the neurons see of the inputs (these standardized, and their
+    /// ramps) where that is linked directly. Inputs have been held to their [`bounds`](Self::bounds).
     /// Times [`beta`](Self::beta) plus [`intercept`](Self::intercept) it is the prediction, before that
     /// is held to its own.
     ///
@@ -267,11 +266,7 @@ impl<A: Scalar, D: TargetDim> Elm<A, D> {
     /// The slope of each output at each row along each input, as the network makes its inputs
     /// (standardized, where that is on): one matrix (rows, inputs) for each output.
     pub(crate) fn gradients(&self, x: &ArrayRef2<A>) -> impl Iterator<Item = Array2<A>> {
-        let held = self.held_inputs(x);
-        let x = match self.scaler() {
-            Some(scaler) => scaler.transform(held.view()),
-            None => held,
-        };
+        let x = self.held_inputs(x);
         let columns = self.beta.columns().into_iter();
         columns.map(move |beta| self.map.gradient(x.view(), beta))
     }

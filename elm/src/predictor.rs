@@ -127,7 +127,7 @@ impl<A: Scalar, D: TargetDim> Predictor<A, D> {
         });
         let input_bounds = inputs.into_iter().flatten().collect();
         Self {
-            map: PackedMap::new(model.map(), model.beta(), input_bounds),
+            map: PackedMap::for_prediction(model.map(), model.beta(), input_bounds),
             intercept: model.intercept().to_vec(),
             output_bounds: outputs.into_iter().flatten().collect(),
             dimension: PhantomData,
@@ -157,7 +157,7 @@ impl<A: Scalar, D: TargetDim> Predictor<A, D> {
     /// Number of inputs.
     #[must_use]
     pub fn inputs(&self) -> usize {
-        self.map.packed.inputs
+        self.map.inputs
     }
 
     /// Number of hidden neurons.
@@ -312,8 +312,9 @@ impl<A: Scalar, D: TargetDim> Predictor<A, D> {
                 sums,
             });
         })?;
-        let inputs = &scratch.tile.inputs[..rows * packed.inputs];
+        self.map.add_links(rows, &mut scratch.tile, sums);
         for first in (0..packed.link_panels).step_by(CHUNK_PANELS) {
+            let inputs = &scratch.tile.inputs[..rows * packed.inputs];
             let panels = CHUNK_PANELS.min(packed.link_panels - first);
             let hidden = &mut scratch.tile.hidden[..rows * panels * A::LINE];
             link(inputs, packed.inputs, rows, first * A::LINE, hidden);

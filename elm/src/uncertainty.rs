@@ -24,6 +24,11 @@
 //! $r = (\sum_j g_j^2 e_j^2)^{1/2}$ as one more independent deviation, and $6r$ at either end of an
 //! interval. This assumes that the function is no steeper outside than inside; it is no guarantee.
 //!
+//! Of rows with weights, a row of weight $w$ is taken for an observation whose noise has the variance
+//! $\sigma^2 / w$, and a new observation for one of the mean weight. Rows of one
+//! [group](Dataset::with_groups) are left out together: the intervals are those of new groups, from the
+//! groups' held-out errors (CV+ in the same paper, not studentized), and $\sigma^2$ is the mean square of those.
+//!
 //! Both take the random layer, its standardization and $\lambda$ as given. Where these were chosen on
 //! the same rows, as $\lambda$ is by default and everything by [`ElmParams::auto`], nothing is
 //! guaranteed: errors are larger than either says, a little with many rows, and by a half with ten. There
@@ -43,12 +48,14 @@
 //! # Ok::<(), elm::Error>(())
 //! ```
 
-use ndarray::{Array, Array1, Array2, ArrayRef2, Axis, Ix2, Zip, s};
+use std::collections::BTreeMap;
+
+use ndarray::{Array, Array1, Array2, ArrayRef2, ArrayView2, Axis, Ix2, Zip, s};
 
 use crate::cross_validation::CrossValidator;
 use crate::dataset::{Dataset, Inputs, TargetDim, per_output};
 use crate::error::{Error, Result};
-use crate::metrics::root_mean_squares;
+use crate::metrics::{root_mean_square, root_mean_squares};
 use crate::model::ElmParams;
 use crate::network::Elm;
 use crate::scalar::Scalar;
@@ -81,6 +88,8 @@ pub struct UncertainElm<A: Scalar, D: TargetDim = Ix2> {
     members: Vec<Member<A, D>>,
     /// Leave-one-out residuals of the mean, shape (rows, outputs).
     left_out: Array2<A>,
+    /// The rows that count, and what they weigh.
+    rows: CountedRows<A>,
     /// Their sizes over the deviation of a new observation there, in units of the noise, by the fit
     /// without the row.
     scores: Array2<A>,
@@ -89,6 +98,66 @@ pub struct UncertainElm<A: Scalar, D: TargetDim = Ix2> {
     /// Mean square slope of each output along each input of the layer over the training rows, shape
     /// (inputs, outputs).
     steepness: Array2<A>,
+}
+
+/// Rows whose weight is not 0.
+#[derive(Debug, Clone)]
+struct CountedRows<A: Scalar> {
+    present: Vec<usize>,
+    /// Of all rows, the mean of those present being 1.
+    weights: Array1<A>,
+    /// The mean weight over the largest.
+    mean: A,
+    /// Of each row the number of its group, counted from 0, where rows have groups.
+    groups: Option<Vec<usize>>,
+}
+
+impl<A: Scalar> CountedRows<A> {
+    /// `weights` are those of all rows, the largest being 1.
+    fn new(mut weights: Array1<A>, groups: Option<&[usize]>) -> Self {
+        let present: Vec<usize> = (0..weights.len())
+            .filter(|&row| weights[row] > A::zero())
+            .collect();
+        let total = stats::sum(weights.iter().map(|w| w.as_f64()));
+        let mean = A::from_f64(total / present.len().max(1) as f64);
+        weights.mapv_inplace(|weight| weight / mean);
+        let groups = groups.map(|groups| {
+            let mut known = BTreeMap::new();
+            for &group in groups {
+                let next = known.len();
+                known.entry(group).or_insert(next);
+            }
+            groups.iter().map(|group| known[group]).collect()
+        });
+        Self {
+            present,
+            weights,
+            mean,
+            groups,
+        }
+    }
+
+    /// The root mean square of each column.
+    fn errors(&self, residuals: ArrayView2<'_, A>) -> Array1<f64> {
+        if self.weights.iter().all(|weight| *weight == A::one()) {
+            return root_mean_squares(residuals);
+        }
+        let columns = residuals.columns().into_iter();
+        let errors = columns.map(|column| root_mean_square(column, self.weights.view()));
+        errors.collect()
+    }
+
+    /// Adds up what rows of one group have, and gives all of them the sum.
+    fn pool(&self, values: &mut Array1<A>) {
+        let Some(groups) = &self.groups else { return };
+        let mut sums = vec![A::zero(); groups.iter().max().map_or(0, |last| last + 1)];
+        for (&group, &value) in groups.iter().zip(&*values) {
+            sums[group] += value;
+        }
+        for (&group, value) in groups.iter().zip(values) {
+            *value = sums[group];
+        }
+    }
 }
 
 /// One of the networks whose mean is predicted.
@@ -115,8 +184,8 @@ impl<A: Scalar> ElmParams<A> {
     /// Fits, and keeps what [`uncertainty`](crate::uncertainty) needs. Factorizes twice.
     ///
     /// # Errors
-    /// Those of [`fit_dataset`](Self::fit_dataset); [`Error::Conflict`] unless the solver is ridge, and for
-    /// rows with weights; [`Error::Undetermined`] when a row cannot be left out, as of a single one.
+    /// Those of [`fit_dataset`](Self::fit_dataset); [`Error::Conflict`] unless the solver is ridge;
+    /// [`Error::Undetermined`] when a row cannot be left out, as of a single one.
     pub fn fit_uncertain<D: TargetDim>(
         &self,
         data: &Dataset<'_, A, D>,
@@ -173,12 +242,6 @@ impl<A: Scalar> ElmParams<A> {
     }
 
     fn fit_member<D: TargetDim>(&self, data: &Dataset<'_, A, D>) -> Result<Member<A, D>> {
-        if data.weights().is_some() {
-            return Err(Error::Conflict {
-                first: "row weights",
-                second: "uncertainty",
-            });
-        }
         if !matches!(self.solver(), Solver::Ridge(_)) {
             return Err(Error::Conflict {
                 first: "a solver other than ridge",
@@ -187,16 +250,19 @@ impl<A: Scalar> ElmParams<A> {
         }
         let model = self.fit_dataset(data)?;
         let hidden = model.hidden_matrix(&data.inputs())?;
-        let problem = self.problem(&hidden, data.target_matrix(), None)?;
+        let weights = data.weights();
+        let problem = self.problem(&hidden, data.target_matrix(), weights.as_ref())?;
         let validator = CrossValidator::new(&problem)?;
-        let left_out = validator
-            .leave_one_out(&model.diagnosis().lambda)?
-            .residuals()
-            .to_owned();
-        // At a training row the posterior's share of the variance is the leverage.
-        let freedom = validator
-            .variance_factor(&hidden, &model.diagnosis().lambda)
-            .mapv_into(|leverage| (A::one() - leverage).max(A::epsilon()));
+        let lambda = &model.diagnosis().lambda;
+        let held_out = match data.groups() {
+            Some(groups) => validator.k_fold(groups, lambda),
+            None => validator.leave_one_out(lambda),
+        };
+        let left_out = held_out?.residuals().to_owned();
+        // At a training row the posterior's share of the variance, times the weight, is the leverage.
+        let mut freedom = validator.variance_factor(&hidden, lambda);
+        freedom *= &validator.weights().insert_axis(Axis(1));
+        freedom.mapv_inplace(|leverage| (A::one() - leverage).max(A::epsilon()));
         Ok(Member {
             model,
             validator,
@@ -211,36 +277,44 @@ impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
         let (x, t) = (data.inputs(), data.target_matrix());
         let models: Vec<&Elm<A, D>> = members.iter().map(|member| &member.model).collect();
         let share = A::from_f64(members.len() as f64).recip();
+        let rows = CountedRows::new(members[0].validator.weights(), data.groups());
         let mut left_out = Array2::zeros(t.dim());
+        // Times the weight of the row.
         let mut variances = Array2::ones(t.dim());
         for member in &members {
             left_out.scaled_add(share, &member.left_out);
-            // Of the fit without the row: h / (1 - h).
-            variances.zip_mut_with(&member.freedom, |v: &mut A, &f| {
-                *v += share * (f.recip() - A::one());
-            });
+            if rows.groups.is_none() {
+                // Of the fit without the row: h / (1 - h).
+                variances.zip_mut_with(&member.freedom, |v: &mut A, &f| {
+                    *v += share * (f.recip() - A::one());
+                });
+            }
         }
-        let scores = Zip::from(&left_out)
+        let mut scores = Zip::from(&left_out)
             .and(&variances)
             .map_collect(|e, v| e.abs() / v.sqrt());
+        scores *= &rows.weights.mapv(A::sqrt).insert_axis(Axis(1));
         let mut model = Elm::mean(&models);
         let residuals = &t - &model.predict_matrix(&x)?;
         if members.len() > 1 {
             model.set_errors(residuals.view(), left_out.view());
         }
-        let rows = residuals.nrows() as f64;
+        let count = rows.present.len() as f64;
         let noise = Zip::from(residuals.columns())
             .and(left_out.columns())
             .map_collect(|r, l| {
-                let products = r.iter().zip(l).map(|(r, l)| r.as_f64() * l.as_f64());
+                let r = if rows.groups.is_some() { l } else { r };
+                let products = r.iter().zip(l).zip(&rows.weights);
+                let products = products.map(|((r, l), w)| r.as_f64() * l.as_f64() * w.as_f64());
                 // Each product is a square over 1 - h, so only rounding can make it negative.
-                A::from_f64((stats::sum(products).max(0.0) / rows).sqrt())
+                A::from_f64((stats::sum(products).max(0.0) / count).sqrt())
             });
         Ok(Self {
-            steepness: steepness(&model, &x),
+            steepness: steepness(&model, &x.select(Axis(0), &rows.present)),
             model,
             members,
             left_out,
+            rows,
             scores,
             noise,
         })
@@ -257,10 +331,11 @@ impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
         self.members.iter().map(|member| &member.model)
     }
 
-    /// The leave-one-out RMSE of each output.
+    /// The leave-one-out RMSE of each output, with the weights of the rows; of rows with groups that of
+    /// leaving out a group.
     #[must_use]
     pub fn leave_one_out(&self) -> D::PerOutput<f64> {
-        let errors = root_mean_squares(self.left_out.view());
+        let errors = self.rows.errors(self.left_out.view());
         per_output::<D, _>(errors.len(), |output| errors[output])
     }
 
@@ -270,7 +345,7 @@ impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
     pub fn members_leave_one_out(&self) -> Array2<f64> {
         let mut all = Array2::zeros((self.members.len(), self.model.outputs()));
         for (mut row, member) in all.rows_mut().into_iter().zip(&self.members) {
-            row.assign(&root_mean_squares(member.left_out.view()));
+            row.assign(&self.rows.errors(member.left_out.view()));
         }
         all
     }
@@ -344,7 +419,7 @@ impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
         let mut spread = Array2::zeros((x.nrows(), self.model.outputs()));
         for member in &self.members {
             let hidden = member.model.hidden_matrix(&x)?;
-            spread.scaled_add(share, &member.spread(&hidden));
+            spread.scaled_add(share * self.rows.mean, &member.spread(&hidden));
         }
         let mut deviation = spread.mapv_into(|s| (A::one() + s).sqrt()) * &self.noise;
         deviation.zip_mut_with(&self.change_outside(&x), |d, &change| *d = d.hypot(change));
@@ -377,7 +452,7 @@ impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
         let predicted = self.model.predict_matrix(&x)?;
         let hidden = self.members().map(|member| member.hidden_matrix(&x));
         let hidden = hidden.collect::<Result<Vec<_>>>()?;
-        let rows = self.left_out.nrows();
+        let rows = self.rows.present.len();
         // The k-th smallest and largest of n ends, k = floor(alpha (n + 1)).
         let outside = ((1.0 - coverage) * (rows as f64 + 1.0) + 1e-9).floor() as usize;
         // A coverage near 0 would leave out more ends than there are.
@@ -389,37 +464,47 @@ impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
         }
         let share = A::from_f64(self.members.len() as f64).recip();
         let change = self.change_outside(&x);
+        let studentized = self.rows.groups.is_none();
         let mut spread = Array2::ones(predicted.dim());
-        for (member, hidden) in self.members.iter().zip(&hidden) {
-            spread.scaled_add(share, &member.spread(hidden));
+        if studentized {
+            for (member, hidden) in self.members.iter().zip(&hidden) {
+                spread.scaled_add(share * self.rows.mean, &member.spread(hidden));
+            }
         }
         let mut ends = vec![A::zero(); rows];
         for (output, scores) in self.scores.columns().into_iter().enumerate() {
             for row in 0..x.nrows() {
                 // How far the prediction here moves when each row is left out, and its variance then.
-                let mut moves = Array1::zeros(rows);
-                let mut halves: Array1<A> = Array1::from_elem(rows, spread[[row, output]]);
+                let mut moves = Array1::zeros(scores.len());
+                let mut halves: Array1<A> = Array1::from_elem(scores.len(), spread[[row, output]]);
                 for (member, hidden) in self.members.iter().zip(&hidden) {
                     let lambda = member.model.diagnosis().lambda[output];
                     let here = hidden.slice(s![row..=row, ..]);
                     let pull = member.validator.influence(&here, lambda);
                     Zip::from(&mut moves)
-                        .and(&mut halves)
                         .and(&pull)
                         .and(member.left_out.column(output))
-                        .and(member.freedom.column(output))
-                        .for_each(|moved, variance, &pull, &left_out, &freedom| {
-                            *moved += share * pull * left_out;
-                            *variance += share * pull * pull / freedom;
-                        });
+                        .for_each(|moved, &pull, &left_out| *moved += share * pull * left_out);
+                    if studentized {
+                        Zip::from(&mut halves)
+                            .and(&pull)
+                            .and(&self.rows.weights)
+                            .and(member.freedom.column(output))
+                            .for_each(|variance, &pull, &weight, &freedom| {
+                                if weight > A::zero() {
+                                    *variance += share * pull * pull / (weight * freedom);
+                                }
+                            });
+                    }
                 }
+                self.rows.pool(&mut moves);
                 halves.mapv_inplace(A::sqrt);
                 halves *= &scores;
                 let center = predicted[[row, output]];
                 let wider = A::from_f64(6.0) * change[[row, output]];
                 let mut end = |sign: A| {
-                    for ((end, &half), &moved) in ends.iter_mut().zip(&halves).zip(&moves) {
-                        *end = sign * (center - moved) - half;
+                    for (end, &counted) in ends.iter_mut().zip(&self.rows.present) {
+                        *end = sign * (center - moves[counted]) - halves[counted];
                     }
                     let (_, value, _) = ends.select_nth_unstable_by(outside - 1, |a, b| {
                         a.as_f64().total_cmp(&b.as_f64())

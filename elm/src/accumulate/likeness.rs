@@ -81,8 +81,10 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
             .groups()
             .iter()
             .filter_map(|g| g.input_scales());
+        let columns = self.map.columns_of(input);
+        let weighs = |&column: &usize| weights.row(column).iter().any(|w| *w != A::zero());
         self.map.direct_links()
-            || weights.row(input).iter().any(|w| *w != A::zero())
-            || scales.any(|scales| scales[input] != A::zero())
+            || columns.iter().any(weighs)
+            || scales.any(|scales| columns.iter().any(|&c| scales[c] != A::zero()))
     }
 }

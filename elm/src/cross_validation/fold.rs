@@ -33,10 +33,26 @@ enum Form<A: Scalar> {
     Directions(Array2<A>, Array2<A>),
 }
 
+/// Of one label nothing would be left to fit to.
+///
+/// # Errors
+/// [`Error::Parameter`].
+pub(crate) fn check_several(name: &'static str, labels: &[usize]) -> Result<()> {
+    if labels.windows(2).any(|pair| pair[0] != pair[1]) {
+        return Ok(());
+    }
+    Err(Error::Parameter {
+        name,
+        value: 1.0,
+        expected: "at least 2 different ones, as rows of one are held out together",
+    })
+}
+
 impl<A: Scalar> Fold<A> {
     /// Groups rows by label and prepares each group.
     pub(super) fn divide(validator: &CrossValidator<A>, labels: &[usize]) -> Result<Vec<Self>> {
         check_length("fold labels", labels.len(), validator.rows())?;
+        check_several("fold labels", labels)?;
         let spectrum = &validator.rows.spectrum;
         let frame = &spectrum.frame;
         let mut groups: BTreeMap<usize, (Vec<usize>, Vec<usize>)> = BTreeMap::new();

@@ -47,13 +47,14 @@ use std::marker::PhantomData;
 use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, Axis, Zip};
 
 use crate::check::check_length;
-pub use crate::dataset::assign_folds;
+pub use crate::dataset::{assign_blocks, assign_folds};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 use crate::solve::design_svd::{DesignSvd, DesignSvdWithRows};
 use crate::solve::ridge::ridge_solution;
-use crate::solve::{LeastSquares, Reason, Ridge, Solution, in_range};
+use crate::solve::{Lambda, LeastSquares, Reason, Ridge, Solution, in_range};
 use fold::Fold;
+pub(crate) use fold::check_several;
 pub use fold_predictions::FoldPredictions;
 pub use predictions::{CvPredictions, LambdaPath};
 
@@ -177,6 +178,12 @@ impl<A: Scalar> CrossValidator<A> {
         (inside, outside)
     }
 
+    /// The weight of each row, the largest being 1.
+    pub(crate) fn weights(&self) -> Array1<A> {
+        let roots = &self.rows.spectrum.frame.root_weights;
+        roots.mapv(|root| root * root)
+    }
+
     /// What an intercept adds to each of the forms below: $1 / n$, or 0 without one.
     fn constant_share(&self) -> A {
         let frame = &self.rows.spectrum.frame;
@@ -217,13 +224,17 @@ impl<A: Scalar> CrossValidator<A> {
     }
 
     /// $1/n + \tilde h^T (\tilde H^T \tilde H + \lambda)^{-1} \tilde h_i$ for one new hidden row and every
-    /// training row $i$: leaving out row $i$ lowers the prediction by its leave-one-out residual
-    /// times this.
+    /// training row $i$, times its weight: leaving out row $i$ lowers the prediction by its leave-one-out
+    /// residual times this; leaving out several, by the sum of their held-out residuals times these.
     pub(crate) fn influence(&self, hidden: &ArrayRef2<A>, lambda: f64) -> Array1<A> {
         let (inside, _) = self.coordinates(hidden);
         let gain = self.rows.spectrum.ridge_gain(&[A::from_f64(lambda)]);
         let along = &inside.row(0) * &gain.column(0);
-        self.rows.u.dot(&along) + self.constant_share()
+        let share = self.constant_share();
+        let roots = &self.rows.spectrum.frame.root_weights;
+        Zip::from(&self.rows.u.dot(&along))
+            .and(roots)
+            .map_collect(|&along, &root| root * (along + root * share))
     }
 
     /// What is predicted for each row by the fit to all others.
@@ -266,7 +277,8 @@ impl<A: Scalar> CrossValidator<A> {
     ///
     /// # Errors
     /// As [`leave_one_out`](Self::leave_one_out); [`Error::Shape`] also when there is not one
-    /// label per row. [`Error::Undetermined`] names the label.
+    /// label per row, [`Error::Parameter`] where all labels are one. [`Error::Undetermined`] names the
+    /// label.
     pub fn k_fold(&self, folds: &[usize], lambda: &[f64]) -> Result<CvPredictions<A>> {
         let folds = Fold::divide(self, folds)?;
         self.k_fold_divided(&folds, lambda)
@@ -296,6 +308,23 @@ impl<A: Scalar> CrossValidator<A> {
     pub fn k_fold_path(&self, folds: &[usize], lambdas: &[f64]) -> Result<LambdaPath> {
         let folds = Fold::divide(self, folds)?;
         self.path(lambdas, |lambda| self.k_fold_divided(&folds, &[lambda]))
+    }
+
+    /// The relative strength that `ridge` takes for each output where rows of one label are held out
+    /// together: a given one, by generalized cross-validation, or in place of leave-one-out the one with the
+    /// smallest [held-out error](Self::k_fold) of a grid of two to a decade, or the strongest whose
+    /// squared error is within 1 % of that.
+    ///
+    /// # Errors
+    /// Those of [`k_fold`](Self::k_fold) and [`select_lambda`](Self::select_lambda).
+    pub fn select_lambda_by_folds(&self, folds: &[usize], ridge: Ridge) -> Result<Vec<f64>> {
+        ridge.check()?;
+        if ridge.lambda() != Lambda::LeaveOneOut {
+            return self.select_lambda(ridge);
+        }
+        let candidates = Ridge::coarse_grid(self.rows.spectrum.condition());
+        let path = self.k_fold_path(folds, &candidates)?;
+        Ok(path.strongest(ridge.shared(), Ridge::HALF_TOLERANCE))
     }
 
     /// The leave-one-out error of each output along a path of relative strengths.

@@ -120,6 +120,18 @@ impl LambdaPath {
             .collect()
     }
 
+    /// For each output, or for all together, the strongest whose error exceeds the smallest by no more than
+    /// this share.
+    pub(super) fn strongest(&self, shared: bool, tolerance: f64) -> Vec<f64> {
+        let strength = |scores| self.lambdas[Ridge::last_within(scores, tolerance)];
+        if !shared {
+            return self.rmse.columns().into_iter().map(strength).collect();
+        }
+        let relative = (&self.rmse / &self.scale).mapv(|r| r * r).sum_axis(Axis(1));
+        let best = strength(relative.mapv_into(f64::sqrt).view());
+        vec![best; self.rmse.ncols()]
+    }
+
     /// The strength with the smallest sum over outputs of the squared error relative to the
     /// output's own variance.
     #[must_use]

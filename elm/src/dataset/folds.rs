@@ -27,6 +27,25 @@ pub fn assign_folds(rows: usize, folds: usize, seed: u64) -> Result<Vec<usize>> 
     Ok(labels)
 }
 
+/// Assigns each row to one of `folds` blocks of neighbouring rows, in their order, sizes differing by at most
+/// 1: folds for rows in the order of time.
+///
+/// # Errors
+/// Those of [`assign_folds`].
+pub fn assign_blocks(rows: usize, folds: usize) -> Result<Vec<usize>> {
+    if folds < 2 || folds > rows {
+        return Err(Error::Parameter {
+            name: "folds",
+            value: folds as f64,
+            expected: "at least 2 and at most the number of rows",
+        });
+    }
+    check_room("the fold labels", rows, 1)?;
+    Ok((0..rows)
+        .map(|row| (row as u128 * folds as u128 / rows as u128) as usize)
+        .collect())
+}
+
 /// Assigns each row to a fold, all rows of a group to the same one: the groups are divided as
 /// [`assign_folds`] divides rows.
 pub(super) fn assign_groups(groups: &[usize], folds: usize, seed: u64) -> Result<Vec<usize>> {

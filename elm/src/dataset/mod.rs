@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::scalar::Scalar;
 pub use arrays::{Inputs, TargetDim, Targets};
 pub(crate) use arrays::{check_outputs, matrix, per_output};
-pub use folds::assign_folds;
+pub use folds::{assign_blocks, assign_folds};
 pub(crate) use rows::Rows;
 
 /// Training data: inputs and targets, and where wanted a weight and a group for each row. Borrowed, and
@@ -107,6 +107,16 @@ impl<'a, A: Scalar, D: TargetDim> Dataset<'a, A, D> {
         check_length("groups of rows", groups.len(), self.rows())?;
         self.groups = Some(groups);
         Ok(self)
+    }
+
+    /// The same rows with these groups, one for each.
+    pub(crate) fn in_groups<'b>(&'b self, groups: &'b [usize]) -> Dataset<'b, A, D> {
+        Dataset {
+            inputs: self.inputs(),
+            targets: self.targets(),
+            weights: self.weights(),
+            groups: Some(groups),
+        }
     }
 
     /// Assigns each row to one of `folds` folds at random: sizes differ by at most 1 or, where rows have

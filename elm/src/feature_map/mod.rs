@@ -1,5 +1,5 @@
-//! The random feature map of an extreme learning machine: standardize, project, activate, and where
-//! wanted pass the inputs through.
+//! The random feature map of an extreme learning machine: standardize, embed, project, activate, and
+//! where wanted pass the inputs through.
 //!
 //! A network is a feature map and a linear readout. The map is drawn, never trained.
 
@@ -11,13 +11,15 @@ mod neurons;
 mod packed;
 mod packed_map;
 mod params;
+mod ramp_tables;
+mod ramps;
 mod rows;
 mod sampling;
 mod scaler;
 #[cfg(test)]
 mod tests;
 
-use ndarray::{Array2, ArrayRef2, ArrayView1, ArrayView2, s};
+use ndarray::{Array2, ArrayRef2, ArrayView1, ArrayView2, CowArray, Ix2, s};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
@@ -34,11 +36,13 @@ pub use neurons::{Biases, Distribution, NeuronGroup, NodeType};
 pub(crate) use packed::CHUNK_PANELS;
 pub(crate) use packed_map::{PackedMap, TILE_ROWS, TileBuffers, tile_rows};
 pub use params::FeatureMapParams;
+pub use ramps::{Embedding, Ramps};
 pub(crate) use rows::FeatureRows;
 pub use scaler::{Scaler, ScalerBuilder};
 
-/// From inputs to features: standardized by a [`Scaler`], through the neurons of a
-/// [`HiddenLayer`], and followed by the standardized inputs themselves where these are linked directly.
+/// From inputs to features: standardized by a [`Scaler`], beside their [`Ramps`] where they have any,
+/// through the neurons of a [`HiddenLayer`], and followed by what the neurons see of the inputs where that
+/// is linked directly.
 ///
 /// ```
 /// use elm::ElmParams;
@@ -54,6 +58,7 @@ pub use scaler::{Scaler, ScalerBuilder};
 #[cfg_attr(feature = "serde", serde(bound = "", try_from = "Parts<A>"))]
 pub struct FeatureMap<A: Scalar> {
     scaler: Option<Scaler<A>>,
+    ramps: Option<Ramps<A>>,
     layer: HiddenLayer<A>,
     direct_links: bool,
 }
@@ -64,6 +69,8 @@ pub struct FeatureMap<A: Scalar> {
 #[serde(bound = "")]
 struct Parts<A: Scalar> {
     scaler: Option<Scaler<A>>,
+    #[serde(default)]
+    ramps: Option<Ramps<A>>,
     layer: HiddenLayer<A>,
     direct_links: bool,
 }
@@ -73,12 +80,28 @@ impl<A: Scalar> TryFrom<Parts<A>> for FeatureMap<A> {
     type Error = Error;
 
     fn try_from(parts: Parts<A>) -> Result<Self> {
-        Self::new(parts.scaler, parts.layer, parts.direct_links)
+        Self::checked(parts.scaler, parts.ramps, parts.layer, parts.direct_links)
+    }
+}
+
+/// Inputs as neurons see them: standardized, and beside their ramps.
+fn embed<'a, A: Scalar>(
+    scaler: Option<&Scaler<A>>,
+    ramps: Option<&Ramps<A>>,
+    x: ArrayView2<'a, A>,
+) -> CowArray<'a, A, Ix2> {
+    let scaled = match scaler {
+        Some(scaler) => CowArray::from(scaler.transform(x)),
+        None => CowArray::from(x),
+    };
+    match ramps {
+        Some(ramps) => ramps.beside(scaled.view(), x).into(),
+        None => scaled,
     }
 }
 
 impl<A: Scalar> FeatureMap<A> {
-    /// A map of these parts: `scaler` is that of the training rows, `None` for inputs that are taken as
+    /// A map without ramps of these parts: `scaler` is that of the training rows, `None` for inputs that are taken as
     /// they are.
     ///
     /// # Errors
@@ -88,23 +111,68 @@ impl<A: Scalar> FeatureMap<A> {
         layer: HiddenLayer<A>,
         direct_links: bool,
     ) -> Result<Self> {
-        layer.check()?;
-        if let Some(scaler) = &scaler {
-            let inputs = scaler.mean().len();
-            check_length("inputs of the scaler", inputs, layer.inputs())?;
-        }
-        Ok(Self::of_checked(scaler, layer, direct_links))
+        Self::checked(scaler, None, layer, direct_links)
     }
 
+    /// The same with the ramps of the inputs, the layer being one of inputs and ramps.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub fn with_ramps(
+        scaler: Option<Scaler<A>>,
+        ramps: Ramps<A>,
+        layer: HiddenLayer<A>,
+        direct_links: bool,
+    ) -> Result<Self> {
+        Self::checked(scaler, Some(ramps), layer, direct_links)
+    }
+
+    fn checked(
+        scaler: Option<Scaler<A>>,
+        ramps: Option<Ramps<A>>,
+        layer: HiddenLayer<A>,
+        direct_links: bool,
+    ) -> Result<Self> {
+        layer.check()?;
+        let mut inputs = layer.inputs();
+        if let Some(ramps) = &ramps {
+            inputs = ramps.inputs();
+            let embedded = inputs.saturating_add(ramps.columns());
+            check_length("inputs of the layer", layer.inputs(), embedded)?;
+        }
+        if let Some(scaler) = &scaler {
+            check_length("inputs of the scaler", scaler.mean().len(), inputs)?;
+        }
+        Ok(Self {
+            scaler,
+            ramps,
+            layer,
+            direct_links,
+        })
+    }
+
+    /// Of parts that fit together.
     pub(crate) fn of_checked(
         scaler: Option<Scaler<A>>,
+        ramps: Option<Ramps<A>>,
         layer: HiddenLayer<A>,
         direct_links: bool,
     ) -> Self {
         Self {
             scaler,
+            ramps,
             layer,
             direct_links,
+        }
+    }
+
+    /// The same map with another layer of as many inputs.
+    pub(crate) fn with_layer(&self, layer: HiddenLayer<A>) -> Self {
+        Self {
+            scaler: self.scaler.clone(),
+            ramps: self.ramps.clone(),
+            layer,
+            direct_links: self.direct_links,
         }
     }
 
@@ -122,14 +190,8 @@ impl<A: Scalar> FeatureMap<A> {
 
     /// As [`transform`](Self::transform), of inputs that have been checked.
     pub(crate) fn apply(&self, x: ArrayView2<'_, A>) -> Array2<A> {
-        match &self.scaler {
-            Some(scaler) => self.apply_to_scaled(scaler.transform(x).view()),
-            None => self.apply_to_scaled(x),
-        }
-    }
-
-    pub(crate) fn apply_to_scaled(&self, x: ArrayView2<'_, A>) -> Array2<A> {
-        let h = self.layer.forward(x);
+        let x = self.embed(x);
+        let h = self.layer.forward(x.view());
         if !self.direct_links {
             return h;
         }
@@ -139,46 +201,80 @@ impl<A: Scalar> FeatureMap<A> {
         both
     }
 
+    /// What the neurons see of inputs that have been checked: standardized, and beside their ramps.
+    pub(crate) fn embed<'a>(&self, x: ArrayView2<'a, A>) -> CowArray<'a, A, Ix2> {
+        embed(self.scaler.as_ref(), self.ramps.as_ref(), x)
+    }
+
     /// The map with these neurons alone, given by rising numbers, such as those that
     /// [pruning](crate::prune) keeps; direct links stay.
     ///
     /// # Errors
     /// Those of [`HiddenLayer::subset`].
     pub fn subset(&self, neurons: &[usize]) -> Result<Self> {
-        let layer = self.layer.subset(neurons)?;
-        Ok(Self::of_checked(
-            self.scaler.clone(),
-            layer,
-            self.direct_links,
-        ))
+        Ok(self.with_layer(self.layer.subset(neurons)?))
     }
 
     pub(crate) fn select(&self, neurons: &[usize]) -> Self {
-        let layer = self.layer.select(neurons);
-        Self::of_checked(self.scaler.clone(), layer, self.direct_links)
+        self.with_layer(self.layer.select(neurons))
     }
 
-    /// The slopes along the (standardized) inputs `x` of $\sum_j \beta_j \phi_j(x)$, shape (rows,
+    /// The slopes at `x` of $\sum_j \beta_j \phi_j(x)$ along the (standardized) inputs, shape (rows,
     /// inputs).
     pub(crate) fn gradient(&self, x: ArrayView2<'_, A>, beta: ArrayView1<'_, A>) -> Array2<A> {
+        let slopes = self.slopes(self.embed(x).view(), beta);
+        let Some(ramps) = &self.ramps else {
+            return slopes;
+        };
+        let factor = |input: usize| self.scaler.as_ref().map_or(A::one(), |s| s.factor()[input]);
+        ramps.slopes_along_inputs(slopes.view(), x, factor)
+    }
+
+    /// The same along all that the neurons see, of [embedded](Self::embed) inputs.
+    pub(crate) fn slopes(&self, u: ArrayView2<'_, A>, beta: ArrayView1<'_, A>) -> Array2<A> {
         let (own, links) = beta.split_at(ndarray::Axis(0), self.layer.neurons());
-        let mut gradient = self.layer.gradient(x, own);
+        let mut gradient = self.layer.gradient(u, own);
         if !links.is_empty() {
             gradient += &links;
         }
         gradient
     }
 
+    /// The columns of the embedding that are made of an input.
+    pub(crate) fn columns_of(&self, input: usize) -> Vec<usize> {
+        match &self.ramps {
+            None => vec![input],
+            Some(ramps) => {
+                let columns = ramps.sources().enumerate();
+                let own = columns.filter(|(_, source)| *source == input);
+                own.map(|(column, _)| column).collect()
+            }
+        }
+    }
+
     /// Number of inputs.
     #[must_use]
     pub fn inputs(&self) -> usize {
-        self.layer.inputs()
+        self.ramps
+            .as_ref()
+            .map_or(self.layer.inputs(), Ramps::inputs)
     }
 
-    /// Number of features: neurons, and inputs where they are linked directly.
+    /// Number of features: neurons, and what they see of the inputs where that is linked directly.
     #[must_use]
     pub fn features(&self) -> usize {
-        self.layer.neurons() + if self.direct_links { self.inputs() } else { 0 }
+        let links = if self.direct_links {
+            self.layer.inputs()
+        } else {
+            0
+        };
+        self.layer.neurons() + links
+    }
+
+    /// The ramps of the inputs, where they have any.
+    #[must_use]
+    pub fn ramps(&self) -> Option<&Ramps<A>> {
+        self.ramps.as_ref()
     }
 
     /// The standardization of inputs, where it is on.
@@ -193,7 +289,7 @@ impl<A: Scalar> FeatureMap<A> {
         &self.layer
     }
 
-    /// Whether the standardized inputs follow the neurons.
+    /// Whether what the neurons see of the inputs follows them.
     #[must_use]
     pub fn direct_links(&self) -> bool {
         self.direct_links

@@ -64,14 +64,33 @@ impl<A: Scalar> Panels<A> {
     }
 }
 
+/// Per panel a line of biases, then a line of weights for each input.
+fn hidden_lines<A: Scalar>(layer: &HiddenLayer<A>, panels: usize, places: &[usize]) -> Aligned<A> {
+    let panel_length = (layer.inputs() + 1) * A::LINE;
+    let mut hidden = zeros(panels * panel_length);
+    let weights = layer.weights();
+    let columns = layer.biases().into_iter().zip(weights.columns());
+    for (&k, (bias, weights)) in places.iter().zip(columns) {
+        let start = k / A::LINE * panel_length + k % A::LINE;
+        let column = std::iter::once(bias).chain(weights);
+        let lines = hidden.iter_mut().skip(start).step_by(A::LINE);
+        lines.zip(column).for_each(|(to, &from)| *to = from);
+    }
+    hidden
+}
+
 impl<A: Scalar> Packed<A> {
-    /// `beta` has shape (neurons, or neurons + inputs with direct links; outputs).
-    pub(crate) fn new(layer: &HiddenLayer<A>, beta: ArrayView2<'_, A>) -> Self {
+    /// `beta` has shape (neurons, or neurons + inputs with direct links; outputs). Hidden weights are
+    /// left out where `hidden` says so; returns also of each neuron its index among the panels' neurons.
+    pub(crate) fn new(
+        layer: &HiddenLayer<A>,
+        beta: ArrayView2<'_, A>,
+        hidden: bool,
+    ) -> (Self, Vec<usize>) {
         let (inputs, neurons) = layer.weights().dim();
         let links = beta.nrows().saturating_sub(neurons);
         let link_panels = links.div_ceil(A::LINE);
         let mut panels = 0;
-        // Of each neuron the place among the panels' neurons.
         let mut places = Vec::with_capacity(neurons);
         let mut groups = Vec::with_capacity(layer.groups().len());
         for group in layer.groups() {
@@ -81,17 +100,11 @@ impl<A: Scalar> Packed<A> {
             panels += count;
         }
 
-        let mut hidden = zeros(panels * (inputs + 1) * A::LINE);
-        let panel_length = (inputs + 1) * A::LINE;
-        let weights = layer.weights();
-        let columns = layer.biases().into_iter().zip(weights.columns());
-        for (&k, (bias, weights)) in places.iter().zip(columns) {
-            let start = k / A::LINE * panel_length + k % A::LINE;
-            let column = std::iter::once(bias).chain(weights);
-            let lines = hidden.iter_mut().skip(start).step_by(A::LINE);
-            lines.zip(column).for_each(|(to, &from)| *to = from);
-        }
-
+        let hidden = if hidden {
+            hidden_lines(layer, panels, &places)
+        } else {
+            zeros(0)
+        };
         let line = (panels + link_panels) * A::LINE;
         let mut packed_beta = zeros(beta.ncols() * line);
         for (to, from) in packed_beta
@@ -110,7 +123,7 @@ impl<A: Scalar> Packed<A> {
                 .zip(links)
                 .for_each(|(to, &from)| *to = from);
         }
-        Self {
+        let packed = Self {
             inputs,
             neurons,
             outputs: beta.ncols(),
@@ -119,7 +132,8 @@ impl<A: Scalar> Packed<A> {
             groups,
             hidden,
             beta: packed_beta,
-        }
+        };
+        (packed, places)
     }
 
     /// Biases and weights of a range of panels.

@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::neurons::{Biases, Distribution, NeuronGroup};
+use super::ramps::{Embedding, check_bins};
 use crate::activation::Activation;
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
@@ -37,12 +38,14 @@ pub struct FeatureMapParams<A: Scalar> {
     pub(crate) distribution: Distribution,
     /// Multiplies all weights.
     pub(crate) scale: f64,
-    /// Multiplies the weights of each input; empty for 1.
+    /// Multiplies the weights of each input, or of each column of the embedding; empty for 1.
     pub(crate) input_scales: Vec<f64>,
     pub(crate) seed: u64,
     #[cfg_attr(feature = "serde", serde(alias = "standardise"))]
     pub(crate) standardize: bool,
     pub(crate) direct_links: bool,
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(crate) embedding: Embedding<A>,
 }
 
 impl<A: Scalar> FeatureMapParams<A> {
@@ -57,6 +60,7 @@ impl<A: Scalar> FeatureMapParams<A> {
             seed: 0,
             standardize: true,
             direct_links: false,
+            embedding: Embedding::default(),
         }
     }
 
@@ -78,6 +82,7 @@ impl<A: Scalar> FeatureMapParams<A> {
     /// Whether drawing takes more of the training rows than the number of their inputs.
     pub(crate) fn needs_rows(&self) -> bool {
         self.groups().any(NeuronGroup::need_rows)
+            || matches!(self.embedding, Embedding::Quantiles(_))
     }
 
     /// Checks the settings.
@@ -109,6 +114,9 @@ impl<A: Scalar> FeatureMapParams<A> {
         }
         if self.distribution == Distribution::StudentT(0) {
             return parameter("degrees of freedom", 0.0, "at least 1");
+        }
+        if let Embedding::Quantiles(bins) = self.embedding {
+            check_bins(bins)?;
         }
         for group in self.groups() {
             if !(group.scale > 0.0 && group.scale.is_finite()) {

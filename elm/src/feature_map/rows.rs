@@ -39,9 +39,13 @@ impl<'a, A: Scalar> FeatureRows<'a, A> {
         self.x.nrows()
     }
 
-    /// Neurons, and inputs where they are linked directly.
+    /// Neurons, and what they see of the inputs where that is linked directly.
     pub(crate) fn columns(&self) -> usize {
-        let links = if self.direct_links { self.x.ncols() } else { 0 };
+        let links = if self.direct_links {
+            self.map.packed.inputs
+        } else {
+            0
+        };
         self.map.packed.neurons + links
     }
 

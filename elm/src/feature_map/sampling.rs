@@ -5,11 +5,12 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{StandardNormal, StandardUniform};
 
-use super::FeatureMap;
 use super::layer::{HiddenLayer, NeuronBlock};
 use super::neurons::{Biases, Distribution, NeuronGroup, NodeType};
 use super::params::FeatureMapParams;
+use super::ramps::{Embedding, Ramps};
 use super::scaler::Scaler;
+use super::{FeatureMap, embed};
 use crate::check::{check_length, check_matrix};
 use crate::error::{Error, Result};
 use crate::memory::check_room;
@@ -22,11 +23,16 @@ use crate::stream::Stream;
 pub(crate) struct Inputs<'a, A: Scalar> {
     x: ArrayView2<'a, A>,
     scaler: Option<&'a Scaler<A>>,
+    ramps: Option<&'a Ramps<A>>,
 }
 
 impl<'a, A: Scalar> Inputs<'a, A> {
-    pub(super) fn new(x: ArrayView2<'a, A>, scaler: Option<&'a Scaler<A>>) -> Self {
-        Self { x, scaler }
+    pub(super) fn new(
+        x: ArrayView2<'a, A>,
+        scaler: Option<&'a Scaler<A>>,
+        ramps: Option<&'a Ramps<A>>,
+    ) -> Self {
+        Self { x, scaler, ramps }
     }
 
     pub(super) fn nrows(&self) -> usize {
@@ -34,23 +40,26 @@ impl<'a, A: Scalar> Inputs<'a, A> {
     }
 
     pub(super) fn ncols(&self) -> usize {
-        self.x.ncols()
+        self.x.ncols() + self.ramps.map_or(0, Ramps::columns)
     }
 
     fn row(&self, row: usize) -> Array1<A> {
-        match self.scaler {
-            None => self.x.row(row).to_owned(),
-            Some(scaler) => {
-                let row = self.x.slice(s![row..=row, ..]);
-                scaler.transform(row).row(0).to_owned()
-            }
+        let row = self.x.slice(s![row..=row, ..]);
+        embed(self.scaler, self.ramps, row).row(0).to_owned()
+    }
+
+    /// Of each column the input that it is made of.
+    fn sources(&self) -> Vec<usize> {
+        match self.ramps {
+            None => (0..self.x.ncols()).collect(),
+            Some(ramps) => ramps.sources().collect(),
         }
     }
 }
 
 impl<'a, A: Scalar> From<ArrayView2<'a, A>> for Inputs<'a, A> {
     fn from(x: ArrayView2<'a, A>) -> Self {
-        Self::new(x, None)
+        Self::new(x, None, None)
     }
 }
 
@@ -71,7 +80,8 @@ impl<A: Scalar> FeatureMapParams<A> {
         }
         let nowhere = Array2::zeros((1, inputs));
         check_matrix("inputs", nowhere.view())?;
-        self.draw_layer(nowhere.view(), None, None)
+        let ramps = self.ramps_of(nowhere.view(), None)?;
+        self.draw_layer(Inputs::new(nowhere.view(), None, ramps.as_ref()), None)
     }
 
     /// The map for these training rows, shape (rows, inputs): measures them and draws the layer.
@@ -91,24 +101,52 @@ impl<A: Scalar> FeatureMapParams<A> {
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<FeatureMap<A>> {
         let scaler = self.standardize.then(|| Scaler::measure(x, weights));
-        let layer = self.draw_layer(x, scaler.as_ref(), weights)?;
-        Ok(FeatureMap::of_checked(scaler, layer, self.direct_links))
+        self.draw_scaled(x, scaler, weights)
     }
 
-    /// The layer for these rows, standardized by `scaler`, of these positive weights.
-    pub(crate) fn draw_layer(
+    /// The map for these rows, standardized by `scaler`, of these positive weights.
+    pub(crate) fn draw_scaled(
         &self,
         x: ArrayView2<'_, A>,
-        scaler: Option<&Scaler<A>>,
+        scaler: Option<Scaler<A>>,
+        weights: Option<ArrayView1<'_, A>>,
+    ) -> Result<FeatureMap<A>> {
+        let ramps = self.ramps_of(x, weights)?;
+        let inputs = Inputs::new(x, scaler.as_ref(), ramps.as_ref());
+        let layer = self.draw_layer(inputs, weights)?;
+        let links = self.direct_links;
+        Ok(FeatureMap::of_checked(scaler, ramps, layer, links))
+    }
+
+    /// The ramps of these rows.
+    fn ramps_of(
+        &self,
+        x: ArrayView2<'_, A>,
+        weights: Option<ArrayView1<'_, A>>,
+    ) -> Result<Option<Ramps<A>>> {
+        Ok(match &self.embedding {
+            Embedding::Inputs => None,
+            Embedding::Quantiles(bins) => Some(Ramps::of(x, weights, *bins)),
+            Embedding::Ramps(ramps) => {
+                ramps.check(x.ncols())?;
+                Some(ramps.clone())
+            }
+        })
+    }
+
+    fn draw_layer(
+        &self,
+        x: Inputs<'_, A>,
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<HiddenLayer<A>> {
         // A failed allocation would abort the program.
         let per_neuron = x.ncols().saturating_add(1);
         check_room("the hidden layer", per_neuron, self.neurons())?;
-        if !self.input_scales.is_empty() {
-            check_length("input scales", self.input_scales.len(), x.ncols())?;
+        let scales = self.input_scales.len();
+        if scales > 0 && scales != x.x.ncols() {
+            check_length("input scales", scales, x.ncols())?;
         }
-        Ok(self.sample(Inputs::new(x, scaler), weights))
+        Ok(self.sample(x, weights))
     }
 
     /// The layer for these (standardized) training rows with these positive weights.
@@ -157,8 +195,15 @@ impl<A: Scalar> FeatureMapParams<A> {
         layer
     }
 
-    fn input_scale(&self, input: usize) -> f64 {
-        self.input_scales.get(input).copied().unwrap_or(1.0)
+    /// The scale of each column that neurons see: its own, or that of the input that it is made of.
+    fn column_scales(&self, x: Inputs<'_, A>) -> Vec<f64> {
+        let scales = &self.input_scales;
+        if scales.len() == x.ncols() {
+            return scales.clone();
+        }
+        let sources = x.sources().into_iter();
+        let scale = |input: usize| scales.get(input).copied().unwrap_or(1.0);
+        sources.map(scale).collect()
     }
 
     fn projections(
@@ -188,9 +233,10 @@ impl<A: Scalar> FeatureMapParams<A> {
             }
         }
         let scale = self.scale * group.scale;
+        let column_scales = self.column_scales(x);
         // Laid out by rows, as the product reads it.
         let weights = Array2::from_shape_fn((inputs, group.count), |(input, neuron)| {
-            A::from_f64(draws[[neuron, input]] * scale * self.input_scale(input))
+            A::from_f64(draws[[neuron, input]] * scale * column_scales[input])
         });
         let drawn = |scale: f64| draws.column(inputs).mapv(|b| A::from_f64(b * scale));
         let biases = match group.biases {
@@ -216,9 +262,9 @@ impl<A: Scalar> FeatureMapParams<A> {
         group: &NeuronGroup<A>,
         random: &mut ChaCha8Rng,
     ) -> (Array2<A>, Array1<A>) {
-        let scales = Array1::from_shape_fn(x.ncols(), |input| {
-            A::from_f64(self.scale * group.scale * self.input_scale(input))
-        });
+        let own = self.scale * group.scale;
+        let scales = self.column_scales(x).into_iter();
+        let scales: Array1<A> = scales.map(|scale| A::from_f64(own * scale)).collect();
         let rows = places.without_repetition(group.count, random);
         let mut centers = Array2::zeros((x.ncols(), group.count));
         for (mut center, row) in centers.columns_mut().into_iter().zip(rows) {

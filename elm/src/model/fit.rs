@@ -13,7 +13,7 @@ use crate::memory::{check_copies, check_room};
 use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::solve::normal_equations::{HiddenRows, RowSource};
-use crate::solve::{LeastSquares, Solver};
+use crate::solve::{Lambda, LeastSquares, Solver};
 
 impl<A: Scalar> ElmParams<A> {
     /// Draws the hidden layer and solves for the output weights.
@@ -31,7 +31,9 @@ impl<A: Scalar> ElmParams<A> {
         self.fit_dataset(&Dataset::new(x, t)?)
     }
 
-    /// As [`fit`](Self::fit), of rows that may have [weights](Dataset::with_weights).
+    /// As [`fit`](Self::fit), of rows that may have [weights](Dataset::with_weights) and
+    /// [groups](Dataset::with_groups): where ridge chooses its strength by leave-one-out, rows of one group
+    /// are left out together.
     ///
     /// # Errors
     /// [`Error::Parameter`] naming the first setting that is out of range, or for weights that are all 0;
@@ -41,7 +43,7 @@ impl<A: Scalar> ElmParams<A> {
         self.check()?;
         let rows = Rows::new(data)?;
         let map = self.prepare(&rows)?;
-        self.output_weights(map, &rows)
+        self.output_weights(map, &rows, data)
     }
 
     /// Solves for the output weights of a feature map that is there already: drawn by
@@ -76,7 +78,7 @@ impl<A: Scalar> ElmParams<A> {
     ) -> Result<Elm<A, D>> {
         self.check()?;
         let rows = Self::rows_of_map(&map, data)?;
-        self.output_weights(map, &rows)
+        self.output_weights(map, &rows, data)
     }
 
     /// Checks that rows and a map that is there already go together.
@@ -99,8 +101,20 @@ impl<A: Scalar> ElmParams<A> {
         &self,
         map: FeatureMap<A>,
         rows: &Rows<'_, A>,
+        data: &Dataset<'_, A, D>,
     ) -> Result<Elm<A, D>> {
         let (x, t, weights) = (rows.x(), rows.t(), rows.weights());
+        let bounds = Bounds::of(x, t, weights, self.bounded);
+        if let (Solver::Ridge(ridge), Some(groups)) = (self.solver, data.groups())
+            && ridge.lambda() == Lambda::LeaveOneOut
+        {
+            let design = Self::design(data.inputs(), &map)?;
+            let weights = data.weights();
+            let problem = self.problem(&design, data.target_matrix(), weights.as_ref())?;
+            let validator = CrossValidator::new(&problem)?;
+            let lambda = validator.select_lambda_by_folds(groups, ridge)?;
+            return Ok(Elm::assemble(map, validator.solve(&lambda)?, bounds));
+        }
         let mut source = RowSource {
             hidden: HiddenRows::Map(Box::new(FeatureRows::new(&map, x))),
             targets: t,
@@ -115,15 +129,14 @@ impl<A: Scalar> ElmParams<A> {
                 self.solver.solve(&problem)?
             }
         };
-        let bounds = Bounds::of(x, t, weights, self.bounded);
         Ok(Elm::assemble(map, solution, bounds))
     }
 
     /// Held-out predictions for every row, from one random layer and one factorization: `folds`
     /// has one label per row, and rows of one label are predicted by the fit to all others.
     ///
-    /// Ridge has the same strength in every fold, given or chosen on all rows, and inputs are
-    /// standardized on all rows; [`cross_validation`](crate::cross_validation) says what that leaks.
+    /// Ridge has the same strength in every fold, given or chosen by the errors of these folds in place of
+    /// leave-one-out, and inputs are standardized on all rows; [`cross_validation`](crate::cross_validation) says what that leaks.
     /// Predictions are not held to the [`bounds`](crate::bounds) of the other rows.
     ///
     /// # Errors
@@ -137,7 +150,7 @@ impl<A: Scalar> ElmParams<A> {
         data: &Dataset<'_, A, D>,
         folds: &[usize],
     ) -> Result<CvPredictions<A, D>> {
-        let (validator, lambda) = self.in_closed_form(data)?;
+        let (validator, lambda) = self.in_closed_form(data, folds)?;
         Ok(validator.k_fold(folds, &lambda)?.of_dimension())
     }
 
@@ -152,7 +165,7 @@ impl<A: Scalar> ElmParams<A> {
         data: &Dataset<'_, A, D>,
         folds: &[usize],
     ) -> Result<Vec<FoldPredictions<A, D>>> {
-        let (validator, lambda) = self.in_closed_form(data)?;
+        let (validator, lambda) = self.in_closed_form(data, folds)?;
         let all = validator.fold_predictions(folds, &lambda)?.into_iter();
         Ok(all.map(FoldPredictions::of_dimension).collect())
     }
@@ -161,6 +174,7 @@ impl<A: Scalar> ElmParams<A> {
     fn in_closed_form<D: TargetDim>(
         &self,
         data: &Dataset<'_, A, D>,
+        folds: &[usize],
     ) -> Result<(CrossValidator<A>, Vec<f64>)> {
         self.check()?;
         let conflict = |first| {
@@ -179,7 +193,7 @@ impl<A: Scalar> ElmParams<A> {
         };
         let validator = self.validator(data)?;
         let lambda = match ridge {
-            Some(ridge) => validator.select_lambda(ridge)?,
+            Some(ridge) => validator.select_lambda_by_folds(folds, ridge)?,
             None => vec![0.0],
         };
         Ok((validator, lambda))

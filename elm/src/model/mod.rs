@@ -6,7 +6,9 @@ mod settings;
 
 use crate::activation::Activation;
 use crate::error::Result;
-use crate::feature_map::{Biases, Distribution, FeatureMapParams, NeuronGroup, NodeType};
+use crate::feature_map::{
+    Biases, Distribution, Embedding, FeatureMapParams, NeuronGroup, NodeType,
+};
 use crate::scalar::Scalar;
 use crate::solve::Solver;
 pub(crate) use fit::Drawn;
@@ -26,12 +28,13 @@ pub(crate) use fit::Drawn;
 /// | [`groups`](Self::with_group) | none | further groups of neurons beside these | scales positive |
 /// | [`distribution`](Self::with_distribution) | uniform | what weights and biases are drawn from | |
 /// | [`scale`](Self::with_scale) | 1 | multiplies the random weights: how nonlinear the network is, and its most influential setting | positive |
-/// | [`input_scales`](Self::with_input_scales) | none | multiply the weights of each input | one per input, not negative |
+/// | [`input_scales`](Self::with_input_scales) | none | multiply the weights of each input | one per input or ramp, not negative |
 /// | [`seed`](Self::with_seed) | 0 | which random layer | |
 /// | [`solver`](Self::with_solver) | ridge by leave-one-out | how output weights are found | |
 /// | [`intercept`](Self::with_intercept) | on, but off for `Inverse` | an unpenalized constant per output | |
 /// | [`standardize`](Self::with_standardize) | on | inputs to mean 0, deviation 1 over the training rows | |
 /// | [`direct_links`](Self::with_direct_links) | off | inputs also reach the outputs directly (RVFL) | |
+/// | [`embedding`](Self::with_embedding) | inputs alone | what neurons see of the inputs: ramps beside them | at least 1 |
 /// | [`bounded`](Self::with_bounded) | on | holds predictions outside the data to its [bounds](crate::bounds) | |
 ///
 /// # Example
@@ -200,7 +203,8 @@ impl<A: Scalar> ElmParams<A> {
     }
 
     /// Multiplies the weights of each input on top of [`scale`](Self::with_scale): 0 for an input that
-    /// is to be ignored. Empty, the default, means 1 for all.
+    /// is to be ignored. Empty, the default, means 1 for all. With [ramps](Self::with_embedding) those of an
+    /// input have its scale, unless there is one for each input and, after these, for each ramp.
     #[must_use]
     pub fn with_input_scales(mut self, input_scales: Vec<f64>) -> Self {
         self.map.input_scales = input_scales;
@@ -303,6 +307,31 @@ impl<A: Scalar> ElmParams<A> {
     #[must_use]
     pub fn bounded(&self) -> bool {
         self.bounded
+    }
+
+    /// What the neurons, and direct links, see of the inputs: [`Embedding::Quantiles`] gives them ramps
+    /// between quantiles of the training rows beside each input, [`Embedding::Ramps`] given ones.
+    ///
+    /// ```
+    /// use elm::{ElmParams, Embedding};
+    /// use ndarray::{Array1, Axis};
+    ///
+    /// let x = Array1::linspace(0.1, 3.0, 200).mapv(|x: f64| x.powi(6)).insert_axis(Axis(1));
+    /// let t = x.column(0).mapv(|x| x.ln());
+    /// let model = ElmParams::new(30).with_embedding(Embedding::Quantiles(16)).fit(&x, &t)?;
+    /// assert_eq!((model.inputs(), model.hidden().inputs()), (1, 17));
+    /// # Ok::<(), elm::Error>(())
+    /// ```
+    #[must_use]
+    pub fn with_embedding(mut self, embedding: Embedding<A>) -> Self {
+        self.map.embedding = embedding;
+        self
+    }
+
+    /// What the neurons see of the inputs.
+    #[must_use]
+    pub fn embedding(&self) -> &Embedding<A> {
+        &self.map.embedding
     }
 
     /// Checks the settings. Every fit does so first.

@@ -12,7 +12,9 @@ use std::marker::PhantomData;
 use super::ElmParams;
 use crate::activation::Activation;
 use crate::error::Error;
-use crate::feature_map::{Biases, Distribution, FeatureMapParams, NeuronGroup, NodeType};
+use crate::feature_map::{
+    Biases, Distribution, Embedding, FeatureMapParams, NeuronGroup, NodeType,
+};
 use crate::scalar::Scalar;
 use crate::solve::Solver;
 
@@ -60,6 +62,8 @@ struct Named<A: Scalar> {
     standardize: bool,
     #[serde(default)]
     direct_links: bool,
+    #[serde(default)]
+    embedding: Embedding<A>,
     #[serde(default = "yes")]
     bounded: bool,
 }
@@ -148,6 +152,7 @@ impl<A: Scalar> Serialize for ElmParams<A> {
             intercept: own.intercept,
             standardize: own.map.standardize,
             direct_links: own.map.direct_links,
+            embedding: own.map.embedding,
             bounded: own.bounded,
         };
         named.serialize(serializer)
@@ -189,6 +194,7 @@ impl<A: Scalar> From<Named<A>> for ElmParams<A> {
                 seed: named.seed,
                 standardize: named.standardize,
                 direct_links: named.direct_links,
+                embedding: named.embedding,
             },
             solver: named.solver,
             intercept: named.intercept,

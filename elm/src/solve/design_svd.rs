@@ -238,6 +238,14 @@ impl<A: Scalar> DesignSvd<A> {
         errors
     }
 
+    /// The largest singular value over the smallest, 1 without any.
+    pub(crate) fn condition(&self) -> f64 {
+        match (self.s.first(), self.s.last()) {
+            (Some(first), Some(last)) => first.as_f64() / last.as_f64(),
+            _ => 1.0,
+        }
+    }
+
     /// Weighted rows that neither the singular vectors nor the intercept account for.
     pub(crate) fn spare_rows(&self) -> usize {
         let used = self.s.len() + usize::from(self.frame.intercept);

@@ -27,6 +27,28 @@ pub(crate) struct Equilibration<A: Scalar> {
 }
 
 impl<A: Scalar> Equilibration<A> {
+    /// How many rows each stands for, where weights can be such counts: whole multiples, of at most 20, of
+    /// the smallest. (Weights that undo different noise are far apart, or no multiples.) 1 for a row that
+    /// does not count.
+    pub(crate) fn counts(&self) -> Option<Array1<A>> {
+        const MOST: f64 = 20.0;
+        let present = self.root_weights.iter().filter(|root| **root > A::zero());
+        let least = present.fold(1.0, |m: f64, root| m.min(root.as_f64().powi(2)));
+        let count = |root: &A| {
+            let count = root.as_f64().powi(2) / least;
+            let whole = count.round().max(1.0);
+            let close = *root == A::zero() || (count / whole - 1.0).abs() < 1e-6;
+            (close && whole <= MOST).then(|| A::from_f64(whole))
+        };
+        self.root_weights.iter().map(count).collect()
+    }
+
+    /// Whether some rows that count weigh more than others.
+    pub(crate) fn weights_differ(&self) -> bool {
+        let counted = |root: &A| *root > A::zero() && *root < A::one();
+        self.root_weights.iter().any(counted)
+    }
+
     /// What the weights alone say; of means and scales there are none yet.
     pub(crate) fn of_weights(
         rows: usize,

@@ -51,9 +51,26 @@ impl<'p, A: Scalar> Scores<'p, A> {
         residual: ArrayView2<'_, A>,
         one_minus_leverage: ArrayView1<'_, A>,
     ) {
+        self.add_counted(u, residual, one_minus_leverage, None);
+    }
+
+    /// As [`add`](Self::add); of a row that stands for several one is left out.
+    fn add_counted(
+        &mut self,
+        u: ArrayView2<'_, A>,
+        residual: ArrayView2<'_, A>,
+        one_minus_leverage: ArrayView1<'_, A>,
+        counts: Option<ArrayView1<'_, A>>,
+    ) {
         let squared = u.mapv(|u| u * u);
         let mut denominators = A::product(squared.view(), self.complements.view());
         denominators += &one_minus_leverage.insert_axis(Axis(1));
+        if let Some(counts) = counts {
+            // 1 - h / k for 1 - h.
+            for (mut row, &count) in denominators.rows_mut().into_iter().zip(counts) {
+                row.mapv_inplace(|free| (free + (count - A::one())) / count);
+            }
+        }
         let c = self.spectrum.c.view();
         for (output, mut score) in self.sums.columns_mut().into_iter().enumerate() {
             let held = &self.complements * &c.slice(s![.., output..=output]);
@@ -98,12 +115,15 @@ pub(super) fn scores<A: Scalar>(
     roundoff: f64,
 ) -> Array2<f64> {
     let mut scores = Scores::new(&rows.spectrum, candidates, false);
+    let frame = &rows.spectrum.frame;
+    let counts = frame.weights_differ().then(|| frame.counts()).flatten();
     for first in (0..rows.u.nrows()).step_by(SCORED_ROWS) {
         let block = first..rows.u.nrows().min(first + SCORED_ROWS);
-        scores.add(
+        scores.add_counted(
             rows.u.slice(s![block.clone(), ..]),
             rows.residual.slice(s![block.clone(), ..]),
-            rows.one_minus_leverage.slice(s![block]),
+            rows.one_minus_leverage.slice(s![block.clone()]),
+            counts.as_ref().map(|counts| counts.slice(s![block])),
         );
     }
     scores.finish(candidates, roundoff)

@@ -23,6 +23,7 @@
 //! # Ok::<(), elm::Error>(())
 //! ```
 
+pub(crate) mod beside;
 mod cholesky;
 pub(crate) mod design_svd;
 mod diagnosis;

@@ -24,7 +24,9 @@ pub enum Lambda {
     /// This value, positive and finite.
     Relative(#[cfg_attr(feature = "serde", serde(serialize_with = "crate::numbers::finite"))] f64),
     /// The value with the smallest exact leave-one-out error (Allen's PRESS, 1974), or the strongest
-    /// whose squared error is within 1 % of that.
+    /// whose squared error is within 1 % of that. Weights that are whole multiples, of at most 20, of the
+    /// smallest are taken for numbers of rows, of which one is left out; with other weights the choice is
+    /// that of [`Gcv`](Self::Gcv), and so it is for many rows whose weights differ.
     #[default]
     LeaveOneOut,
     /// The same by the generalized cross-validation score (Golub, Heath and Wahba, 1979): cheaper than
@@ -116,6 +118,24 @@ impl Ridge {
     #[must_use]
     pub fn lambda(&self) -> Lambda {
         self.lambda
+    }
+
+    pub(crate) fn shared(self) -> bool {
+        self.shared
+    }
+
+    /// What errors may exceed the smallest by for a stronger ridge, as [`TOLERANCE`] of their squares.
+    pub(crate) const HALF_TOLERANCE: f64 = TOLERANCE / 2.0;
+
+    /// Strengths, two to a decade, down to where the smallest direction of a matrix of this condition is no
+    /// longer held back.
+    pub(crate) fn coarse_grid(condition: f64) -> Vec<f64> {
+        let least = (condition.powi(-2) * 1e-2).max(1e-12);
+        grid(FIRST_STEP)
+            .filter(|step| step % 2 == 0)
+            .map(strength)
+            .filter(|strength| *strength >= least)
+            .collect()
     }
 
     /// The strengths that may be chosen, rising: four to a decade from [`Ridge::FLOOR`] to 100.
@@ -218,8 +238,18 @@ impl Ridge {
             return Ok(Some(ridge_solution(&spectrum, reason, &lambda, None)));
         }
         let candidates = distinguishable_lambdas(&spectrum);
-        let scores = self.worthwhile_scores(tiles, &spectrum, &candidates, roundoff)?;
-        let (lambda, errors) = self.lambda_and_errors(&spectrum, &candidates, &scores);
+        let (candidates, scores) = if spectrum.frame.weights_differ() {
+            let mut lambda = self.by_gcv(&spectrum, roundoff);
+            lambda.sort_by(f64::total_cmp);
+            lambda.dedup();
+            let scores = leave_one_out::scores_of_tiles(tiles, &spectrum, &lambda, roundoff)?;
+            (lambda, scores)
+        } else {
+            let scores = self.worthwhile_scores(tiles, &spectrum, &candidates, roundoff)?;
+            (candidates, scores)
+        };
+        let (lambda, errors) =
+            self.lambda_and_errors(&spectrum, &candidates, &scores, (roundoff, true));
         Ok(Some(ridge_solution(
             &spectrum,
             reason,
@@ -335,7 +365,7 @@ impl Ridge {
     ) -> (Vec<f64>, Vec<f64>) {
         let candidates = distinguishable_lambdas(&rows.spectrum);
         let scores = leave_one_out::scores(rows, &candidates, roundoff);
-        self.lambda_and_errors(&rows.spectrum, &candidates, &scores)
+        self.lambda_and_errors(&rows.spectrum, &candidates, &scores, (roundoff, false))
     }
 
     /// The best candidate of each output, and the root of its mean score.
@@ -344,9 +374,18 @@ impl Ridge {
         spectrum: &DesignSvd<A>,
         candidates: &[f64],
         scores: &Array2<f64>,
+        (roundoff, many_rows): (f64, bool),
     ) -> (Vec<f64>, Vec<f64>) {
         let total = spectrum.total_weight();
-        let chosen = self.choose(spectrum, scores);
+        let by_gcv =
+            spectrum.frame.weights_differ() && (many_rows || spectrum.frame.counts().is_none());
+        let chosen = if by_gcv {
+            let place = |lambda: f64| candidates.iter().position(|c| *c == lambda);
+            let lambda = self.by_gcv(spectrum, roundoff).into_iter();
+            lambda.map(|lambda| place(lambda).unwrap_or(0)).collect()
+        } else {
+            self.choose(spectrum, scores)
+        };
         chosen
             .iter()
             .zip(spectrum.target_scale())

@@ -3,7 +3,8 @@
 //! What decides how good an extreme learning machine is, is the scale of its random weights: too
 //! small and every neuron is a straight line, too large and every neuron is a step. It cannot be
 //! had from a formula, but it can be had from held-out errors, which cost one factorization each
-//! (see [`cross_validation`](crate::cross_validation)). A [`Tuner`] searches within a budget of them:
+//! (see [`cross_validation`](crate::cross_validation)). At the [quick level](Level::Quick) a [`Tuner`]
+//! searches within a budget of them:
 //!
 //! 1. a coarse grid of scales, a factor of $\sqrt{10}$ apart, then smaller and smaller steps, with the
 //!    neurons given or a hundred;
@@ -23,6 +24,11 @@
 //!
 //! An error at a scale below the one that the search begins at counts 6 % more for each decade: networks
 //! that are nearly polynomials have large output weights, which cancel among the rows and nowhere else.
+//!
+//! At the [full level](Level::Full), that of `auto`, neurons also see [ramps](crate::Ramps) along the inputs,
+//! with a scale for each input and ramp by the slopes of the network before, in rounds. Within a round scale and
+//! strength are chosen by generalized cross-validation; the number of rounds, and whether there are ramps,
+//! by errors of rows that neither weights nor slopes have seen.
 //!
 //! A trial looks at 2000 rows at most. With `auto` nearly all trials are of a hundred neurons, some
 //! ten milliseconds each; at most nine are of more.
@@ -45,6 +51,8 @@
 //! # Ok::<(), elm::Error>(())
 //! ```
 
+mod full;
+mod metric;
 mod rows;
 mod search;
 
@@ -53,7 +61,7 @@ use ndarray::Ix2;
 use serde::{Deserialize, Serialize};
 
 use crate::activation::Activation;
-use crate::dataset::{Dataset, Inputs, TargetDim, Targets};
+use crate::dataset::{Dataset, Inputs, Rows, TargetDim, Targets};
 use crate::error::{Error, Result};
 use crate::feature_map::Biases;
 use crate::model::ElmParams;
@@ -74,6 +82,26 @@ pub enum Criterion {
     /// Exact k-fold with this many folds: less optimistic where neighbouring rows are near-copies
     /// of each other.
     KFold(usize),
+    /// Exact k-fold with this many blocks of neighbouring rows, in their order: for series in time, where
+    /// a row says what the next one is.
+    Blocks(usize),
+}
+
+/// How much a [`Tuner`] looks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum Level {
+    /// The scale of the weights and, where wanted, of each input, neurons and direct links: step by
+    /// step, each by exact held-out errors.
+    #[default]
+    Quick,
+    /// Ramps along the inputs, and a scale for each, learned from slopes in rounds whose number is chosen on
+    /// rows that the slopes have not seen. For rows that may be held out one by one: where they have
+    /// [groups](Dataset::with_groups), folds or a [budget](Tuner::with_budget) are asked for, and where rows
+    /// are fewer than 60, the search is that of [`Quick`](Self::Quick).
+    Full,
 }
 
 /// One setting that was tried.
@@ -113,7 +141,8 @@ pub struct Tuned<A: Scalar, D: TargetDim = Ix2> {
 ///
 /// | name | default | purpose | range |
 /// |---|---|---|---|
-/// | [`budget`](Self::with_budget) | 24; 60 for `auto` | factorizations to spend on the search | at least 1 |
+/// | [`level`](Self::with_level) | quick; full for `auto` | how much the search looks for | |
+/// | [`budget`](Self::with_budget) | 24; 60 for `auto` | factorizations to spend on the quick search | at least 1 |
 /// | [`criterion`](Self::with_criterion) | leave-one-out | the error that is made small | at least 2 folds |
 /// | [`max_neurons`](Self::with_max_neurons) | 1000; fewer above 4000 rows | where doubling ends when the number is not given | at least 1 |
 /// | [`search_rows`](Self::with_search_rows) | 2000 | rows that the search looks at, drawn at random | at least 2 |
@@ -123,7 +152,9 @@ pub struct Tuner<A: Scalar> {
     base: ElmParams<A>,
     /// `None` to choose.
     neurons: Option<usize>,
-    budget: usize,
+    level: Level,
+    /// `None` for that of the level.
+    budget: Option<usize>,
     criterion: Criterion,
     /// `None` for a number by the rows.
     max_neurons: Option<usize>,
@@ -135,7 +166,8 @@ pub struct Tuner<A: Scalar> {
 
 impl<A: Scalar> ElmParams<A> {
     /// Chooses everything: neurons, weight scale, a scale per input, direct links and regularization, for
-    /// tanh neurons with their biases on the data, within 60 factorizations.
+    /// tanh neurons with their biases on the data; ramps along the inputs, and a scale for each of them, where that
+    /// is better on rows held out ([`Level::Full`]). [`quick`](Tuner::quick) leaves those out.
     #[must_use]
     pub fn auto() -> Tuner<A> {
         let base = Self::new(1)
@@ -145,7 +177,7 @@ impl<A: Scalar> ElmParams<A> {
             neurons: None,
             per_input: true,
             try_links: true,
-            budget: 60,
+            level: Level::Full,
             ..base.tuner()
         }
     }
@@ -156,7 +188,8 @@ impl<A: Scalar> ElmParams<A> {
         Tuner {
             neurons: Some(self.neurons()),
             base: self,
-            budget: 24,
+            level: Level::Quick,
+            budget: None,
             criterion: Criterion::default(),
             max_neurons: None,
             search_rows: 2000,
@@ -170,14 +203,39 @@ impl<A: Scalar> Tuner<A> {
     /// How many factorizations the search may spend; the final fit comes on top.
     #[must_use]
     pub fn with_budget(mut self, factorizations: usize) -> Self {
-        self.budget = factorizations;
+        self.budget = Some(factorizations);
         self
     }
 
-    /// How many factorizations the search may spend.
+    /// How many factorizations the search may spend, where that is set.
     #[must_use]
-    pub fn budget(&self) -> usize {
+    pub fn budget(&self) -> Option<usize> {
         self.budget
+    }
+
+    /// How much the search looks for.
+    #[must_use]
+    pub fn with_level(mut self, level: Level) -> Self {
+        self.level = level;
+        self
+    }
+
+    /// How much the search looks for.
+    #[must_use]
+    pub fn level(&self) -> Level {
+        self.level
+    }
+
+    /// The search of [`Level::Quick`]: a fraction of the time, for problems that are fitted often.
+    #[must_use]
+    pub fn quick(self) -> Self {
+        self.with_level(Level::Quick)
+    }
+
+    /// Factorizations of the quick search.
+    fn quick_budget(&self) -> usize {
+        self.budget
+            .unwrap_or(if self.neurons.is_none() { 60 } else { 24 })
     }
 
     /// The held-out error that is made small.
@@ -272,17 +330,43 @@ impl<A: Scalar> Tuner<A> {
     #[doc(alias = "GridSearchCV")]
     pub fn tune<D: TargetDim>(&self, data: &Dataset<'_, A, D>) -> Result<Tuned<A, D>> {
         self.check()?;
-        let mut search = Search::new(self, data)?;
+        if let Some(choice) = self.full_search(data)? {
+            return Ok(Tuned {
+                model: choice.params.fit_dataset(data)?,
+                params: choice.params,
+                best: choice.best,
+                trials: choice.trials,
+            });
+        }
+        let folds = rows::folds(self, data)?;
+        let mut search = Search::new(self, data, folds.as_deref())?;
         search.run()?;
         let (best, trials) = search.finish()?;
         let params = self.params(&best);
-        let model = params.fit_dataset(data)?;
+        let model = match &folds {
+            Some(folds) => params.fit_dataset(&data.in_groups(folds))?,
+            None => params.fit_dataset(data)?,
+        };
         Ok(Tuned {
             model,
             params,
             best,
             trials,
         })
+    }
+
+    /// What the full search finds, where it is for these rows.
+    fn full_search<D: TargetDim>(
+        &self,
+        data: &Dataset<'_, A, D>,
+    ) -> Result<Option<full::Choice<A>>> {
+        let rows = Rows::new(data)?.x().nrows().min(self.search_rows);
+        let exchangeable = data.groups().is_none() && self.criterion == Criterion::LeaveOneOut;
+        let full = self.level == Level::Full && self.budget.is_none();
+        if !full || !exchangeable || rows < full::FEWEST_ROWS {
+            return Ok(None);
+        }
+        full::search(self, data)
     }
 
     /// Where doubling ends for a problem of this many rows.
@@ -301,7 +385,9 @@ impl<A: Scalar> Tuner<A> {
             })
         };
         match self {
-            Self { budget: 0, .. } => parameter("budget", 0, "at least 1"),
+            Self {
+                budget: Some(0), ..
+            } => parameter("budget", 0, "at least 1"),
             Self {
                 max_neurons: Some(0),
                 ..
@@ -311,7 +397,7 @@ impl<A: Scalar> Tuner<A> {
                 ..
             } => parameter("search_rows", *rows, "at least 2"),
             Self {
-                criterion: Criterion::KFold(folds @ (0 | 1)),
+                criterion: Criterion::KFold(folds @ (0 | 1)) | Criterion::Blocks(folds @ (0 | 1)),
                 ..
             } => parameter("folds", *folds, "at least 2"),
             Self {

@@ -1,12 +1,13 @@
 //! The rows that a search looks at: which, in which folds, and how far their targets vary.
 
-use ndarray::{Array2, ArrayView1, Axis};
+use ndarray::{ArrayView1, Axis};
 use rand::seq::index;
 
 use super::{Criterion, Tuner};
 use crate::check::present;
-use crate::dataset::{Dataset, TargetDim, assign_folds};
-use crate::error::{Error, Result};
+use crate::cross_validation::check_several;
+use crate::dataset::{Dataset, TargetDim, assign_blocks};
+use crate::error::Result;
 use crate::scalar::Scalar;
 use crate::stats::Moments;
 use crate::stream::Stream;
@@ -30,32 +31,18 @@ pub(super) fn chosen_rows<A: Scalar, D: TargetDim>(
     })
 }
 
-/// The folds that the criterion asks for; nothing for leave-one-out.
-pub(super) fn folds<A: Scalar>(
+/// The folds that the criterion asks for, a label for each row; nothing for leave-one-out.
+pub(super) fn folds<A: Scalar, D: TargetDim>(
     tuner: &Tuner<A>,
-    x: &Array2<A>,
-    t: &Array2<A>,
-    groups: Option<Vec<usize>>,
+    data: &Dataset<'_, A, D>,
 ) -> Result<Option<Vec<usize>>> {
-    match (tuner.criterion, groups) {
-        (Criterion::LeaveOneOut, None) => Ok(None),
-        (Criterion::LeaveOneOut, Some(groups)) => {
-            if groups.iter().all(|&group| group == groups[0]) {
-                return Err(Error::Parameter {
-                    name: "groups",
-                    value: 1.0,
-                    expected: "at least 2",
-                });
-            }
-            Ok(Some(groups))
-        }
-        (Criterion::KFold(folds), None) => {
-            assign_folds(x.nrows(), folds, tuner.base.seed()).map(Some)
-        }
-        (Criterion::KFold(folds), Some(groups)) => {
-            let data = Dataset::new(x, t)?.with_groups(&groups)?;
-            data.folds(folds, tuner.base.seed()).map(Some)
-        }
+    if let Some(groups) = data.groups() {
+        check_several("groups", groups)?;
+    }
+    match tuner.criterion {
+        Criterion::LeaveOneOut => Ok(data.groups().map(<[usize]>::to_vec)),
+        Criterion::KFold(folds) => data.folds(folds, tuner.base.seed()).map(Some),
+        Criterion::Blocks(blocks) => assign_blocks(data.rows(), blocks).map(Some),
     }
 }
 

@@ -2,8 +2,9 @@
 
 use ndarray::{Array1, Array2, ArrayView2, Axis, Ix2};
 
-use super::rows::{chosen_rows, deviation, folds};
+use super::rows::{chosen_rows, deviation};
 use super::{Trial, Tuner};
+use crate::cross_validation::check_several;
 use crate::dataset::{Dataset, Rows, TargetDim};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
@@ -84,7 +85,12 @@ pub(super) struct Search<'a, A: Scalar> {
 }
 
 impl<'a, A: Scalar> Search<'a, A> {
-    pub(super) fn new<D: TargetDim>(tuner: &'a Tuner<A>, data: &Dataset<'_, A, D>) -> Result<Self> {
+    /// `labels` has the fold of each row, where rows are held out in folds.
+    pub(super) fn new<D: TargetDim>(
+        tuner: &'a Tuner<A>,
+        data: &Dataset<'_, A, D>,
+        labels: Option<&[usize]>,
+    ) -> Result<Self> {
         // Some rows, and weights that are not all 0.
         drop(Rows::new(data)?);
         let (x, t) = (data.inputs(), data.target_matrix());
@@ -97,13 +103,15 @@ impl<'a, A: Scalar> Search<'a, A> {
             Some(rows) => weights.select(Axis(0), rows),
             None => weights.to_owned(),
         });
-        let groups: Option<Vec<usize>> = data.groups().map(|groups| match &chosen {
-            Some(rows) => rows.iter().map(|&row| groups[row]).collect(),
-            None => groups.to_vec(),
+        let folds = labels.map(|labels| match &chosen {
+            Some(rows) => rows.iter().map(|&row| labels[row]).collect(),
+            None => labels.to_vec(),
         });
+        if let Some(folds) = &folds {
+            check_several("groups", folds)?;
+        }
         let most = tuner.most_neurons(x.nrows());
         let (x, t) = (select(x), select(t));
-        let folds = folds(tuner, &x, &t, groups)?;
         // A weighted sum of standardized inputs has a deviation of about 1 at this scale.
         let center = -(x.ncols() as f64).log10() / 2.0;
         Ok(Self {
@@ -121,7 +129,7 @@ impl<'a, A: Scalar> Search<'a, A> {
             current: 0,
             exponents: (center - 3.0 * COARSE, center + 3.0 * COARSE),
             spent: 0,
-            limit: tuner.budget,
+            limit: tuner.quick_budget(),
             most,
             steepness: None,
             links: tuner.base.direct_links(),
@@ -148,7 +156,7 @@ impl<'a, A: Scalar> Search<'a, A> {
     }
 
     pub(super) fn run(&mut self) -> Result<()> {
-        let budget = self.tuner.budget;
+        let budget = self.tuner.quick_budget();
         let most = self.most;
         let neurons = self.tuner.neurons.unwrap_or(SEARCH_NEURONS.min(most));
         if self.tuner.neurons.is_none() {
@@ -383,11 +391,15 @@ impl<'a, A: Scalar> Search<'a, A> {
             score: f64::INFINITY,
         };
         let validator = self.tuner.params(&trial).validator(&self.data()?)?;
-        let lambda = validator.select_lambda(Ridge::leave_one_out())?;
-        let held_out = match &self.folds {
+        let ridge = Ridge::leave_one_out();
+        let lambda = match &self.folds {
+            Some(folds) => validator.select_lambda_by_folds(folds, ridge),
+            None => validator.select_lambda(ridge),
+        };
+        let held_out = lambda.and_then(|lambda| match &self.folds {
             Some(folds) => validator.k_fold(folds, &lambda),
             None => validator.leave_one_out(&lambda),
-        };
+        });
         let held_out = match held_out {
             Ok(held_out) => held_out,
             // A row or fold that cannot be left out, as of a single one: any setting is as good.

@@ -112,15 +112,18 @@ fn rows_of_weight_0_are_no_rows_for_validation_and_the_tuner() {
 }
 
 #[test]
-fn uncertainty_refuses_weights() {
+fn equal_weights_are_none_for_uncertainty() {
     let (x, t) = problem(20);
-    let weights = Array1::ones(20);
-    let data = Dataset::new(&x, &t)
-        .unwrap()
-        .with_weights(&weights)
-        .unwrap();
-    let found = ElmParams::new(5).fit_uncertain(&data);
-    assert!(matches!(found, Err(Error::Conflict { .. })));
+    let weights = Array1::from_elem(20, 4.0);
+    let data = Dataset::new(&x, &t).unwrap();
+    let plain = ElmParams::new(5).fit_uncertain(&data).unwrap();
+    let weighted = data.with_weights(&weights).unwrap();
+    let weighted = ElmParams::new(5).fit_uncertain(&weighted).unwrap();
+    assert_eq!(
+        weighted.predict_interval(&x, 0.8).unwrap(),
+        plain.predict_interval(&x, 0.8).unwrap()
+    );
+    assert_eq!(weighted.noise(), plain.noise());
 }
 
 #[test]

@@ -77,7 +77,7 @@ fn files_are_written_whole_in_the_form_their_name_asks_for() {
     }
     let text = std::fs::read_to_string(dir.path().join("model.json")).unwrap();
     assert!(
-        text.starts_with("{\n  \"format\": \"elm model\",\n  \"version\": 3,"),
+        text.starts_with("{\n  \"format\": \"elm model\",\n  \"version\": 4,"),
         "{text:.80}"
     );
     assert_eq!(
@@ -169,17 +169,17 @@ fn each_kind_of_damage_has_its_own_error() {
     );
     assert!(matches!(refuse(b"%PDF-1.7 and so on"), Error::Foreign));
     assert!(matches!(
-        refuse(&with(8, 4)),
+        refuse(&with(8, 5)),
         Error::Future {
-            found: 4,
-            supported: 3
+            found: 5,
+            supported: 4
         }
     ));
     assert!(matches!(
-        refuse(&with(8, 2)),
+        refuse(&with(8, 3)),
         Error::Past {
-            found: 2,
-            supported: 3
+            found: 3,
+            supported: 4
         }
     ));
     assert!(matches!(refuse(&with(13, b'E')), Error::Kind { .. }));

@@ -1,0 +1,249 @@
+//! The search of [`Level::Full`](super::Level): with ramps or without, and how many rounds of the
+//! learned [metric](super::metric).
+
+use ndarray::{Array1, Array2, Axis};
+use rand::seq::SliceRandom;
+
+use super::metric::{Path, ROUNDS, Round, Seen, layer, wide};
+use super::rows::{chosen_rows, deviation};
+use super::{Trial, Tuner};
+use crate::dataset::{Dataset, TargetDim};
+use crate::error::Result;
+use crate::feature_map::{Embedding, Ramps};
+use crate::model::ElmParams;
+use crate::scalar::Scalar;
+use crate::stats::Moments;
+use crate::stream::Stream;
+
+/// Rows under which the learned metric fits noise.
+pub(super) const FEWEST_ROWS: usize = 60;
+/// Neurons of a layer of the search.
+const NEURONS: (usize, usize) = (50, 200);
+/// Ramps of an input at most, and of all inputs together.
+const BINS: usize = 16;
+const COLUMNS: usize = 600;
+/// Rows up to which every row is held out once, in turn; of more, a quarter is.
+const FEW_ROWS: usize = 1500;
+const FOLDS: usize = 3;
+/// Layers that are solved at most; a path has some 20.
+const MOST_LAYERS: usize = 500;
+/// What ramps, or another round, must win by: each fits more to the rows.
+const MARGIN: f64 = 0.005;
+/// A held-out error, relative to the targets' deviation, that sums of squares cannot tell from 0.
+const ROUNDING: f64 = 1e-5;
+
+/// What the full search found.
+pub(super) struct Choice<A: Scalar> {
+    pub(super) params: ElmParams<A>,
+    pub(super) best: Trial,
+    pub(super) trials: Vec<Trial>,
+}
+
+/// Held-out errors of a number of rounds, with ramps or without.
+struct Candidate {
+    ramps: bool,
+    round: usize,
+    error: f64,
+}
+
+/// Nothing where errors are so small that the exact search is to decide.
+pub(super) fn search<A: Scalar, D: TargetDim>(
+    tuner: &Tuner<A>,
+    data: &Dataset<'_, A, D>,
+) -> Result<Option<Choice<A>>> {
+    let chosen = chosen_rows(tuner, data);
+    let rows = chosen.unwrap_or_else(|| (0..data.rows()).collect());
+    let x = wide(data.inputs().select(Axis(0), &rows).view());
+    let weights = data
+        .weights()
+        .map(|weights| weights.select(Axis(0), &rows).mapv(Scalar::as_f64));
+    let mut targets = wide(data.target_matrix().select(Axis(0), &rows).view());
+    for mut column in targets.columns_mut() {
+        let view = weights.as_ref().map(|weights| weights.view());
+        let spread = deviation(column.view(), view);
+        let moments = Moments::of(column.view().insert_axis(Axis(1)), view);
+        let mean = moments.columns()[0].mean();
+        column.mapv_inplace(|t| (t - mean) / spread);
+    }
+    let neurons = (rows.len() / 3).clamp(NEURONS.0, NEURONS.1);
+    let seed = tuner.seed();
+    let mut search = FullSearch {
+        plain: Seen::new(x.clone(), targets.clone(), weights.clone(), None, seed),
+        embedded: Seen::new(x.clone(), targets, weights, Some(bins(&x)), seed),
+        neurons,
+        left: MOST_LAYERS,
+        rounds: if tuner.per_input { ROUNDS } else { 0 },
+        trials: Vec::new(),
+        last: [None, None],
+    };
+    let best = search.candidates(seed)?;
+    if best.error < ROUNDING * ROUNDING {
+        return Ok(None);
+    }
+    let round = search.settle(&best)?;
+    let seen = search.seen(best.ramps);
+    let base = layer(tuner.most_neurons(data.rows()), seed);
+    let best = Trial {
+        neurons: base.neurons(),
+        scale: round.scale,
+        input_scales: round.column_scales.clone(),
+        direct_links: true,
+        score: best.error.sqrt(),
+    };
+    let params = tuner
+        .params(&best)
+        .with_distribution(base.distribution())
+        .with_embedding(narrow(seen.embedding())?);
+    search.trials.push(best.clone());
+    Ok(Some(Choice {
+        params,
+        best,
+        trials: search.trials,
+    }))
+}
+
+/// Ramps of an input: fewer where there are many inputs of more than two values.
+fn bins(x: &Array2<f64>) -> usize {
+    let mut graded = 0;
+    for column in x.columns() {
+        let mut values = column.iter().filter(|v| **v != column[0]);
+        if let Some(&second) = values.next()
+            && values.any(|v| *v != second)
+        {
+            graded += 1;
+        }
+    }
+    (COLUMNS / usize::max(graded, 1)).clamp(2, BINS)
+}
+
+fn narrow<A: Scalar>(embedding: Embedding<f64>) -> Result<Embedding<A>> {
+    Ok(match embedding {
+        Embedding::Ramps(ramps) => {
+            let edges = (0..ramps.inputs()).map(|input| {
+                let own = ramps.edges(input).iter();
+                own.map(|&edge| A::from_f64(edge)).collect()
+            });
+            Embedding::Ramps(Ramps::new(edges.collect())?)
+        }
+        _ => Embedding::Inputs,
+    })
+}
+
+struct FullSearch {
+    plain: Seen,
+    embedded: Seen,
+    neurons: usize,
+    left: usize,
+    rounds: usize,
+    trials: Vec<Trial>,
+    /// The rounds of the last path, without ramps and with.
+    last: [Option<Vec<Round>>; 2],
+}
+
+impl FullSearch {
+    fn seen(&self, ramps: bool) -> &Seen {
+        if ramps { &self.embedded } else { &self.plain }
+    }
+
+    /// The structure and number of rounds with the smallest held-out error.
+    fn candidates(&mut self, seed: u64) -> Result<Candidate> {
+        let rows = self.plain.x.nrows();
+        let mut order: Vec<usize> = (0..rows).collect();
+        order.shuffle(&mut Stream::Folds.of(seed));
+        let folds: Vec<Vec<usize>> = if rows <= FEW_ROWS {
+            (0..FOLDS)
+                .map(|fold| order.iter().copied().skip(fold).step_by(FOLDS).collect())
+                .collect()
+        } else {
+            vec![order[..rows / 4].to_vec()]
+        };
+        let mut best: Option<Candidate> = None;
+        for ramps in [false, true] {
+            if ramps && !self.embedded.has_ramps() {
+                continue;
+            }
+            let mut errors: Vec<(f64, usize)> = Vec::new();
+            for held in &folds {
+                let mut is_held = vec![false; rows];
+                held.iter().for_each(|&row| is_held[row] = true);
+                let kept: Vec<usize> = (0..rows).filter(|&row| !is_held[row]).collect();
+                let found = self.path(ramps, kept, self.rounds, held)?;
+                let Some(found) = found else { break };
+                for (round, (_, squares)) in found.iter().enumerate() {
+                    let mean = self.mean(held, squares);
+                    if errors.len() <= round {
+                        errors.push((0.0, 0));
+                    }
+                    errors[round].0 += mean;
+                    errors[round].1 += 1;
+                }
+                let rounds = found.into_iter().map(|(round, _)| round);
+                self.last[usize::from(ramps)] = Some(rounds.collect());
+            }
+            let outputs = self.plain.targets.ncols() as f64;
+            let complete = errors.iter().take_while(|(_, count)| *count == folds.len());
+            for (round, (sum, count)) in complete.enumerate() {
+                let error = sum / *count as f64 / outputs;
+                let wins = |best: &Candidate| error < best.error * (1.0 - MARGIN);
+                if best.as_ref().is_none_or(wins) {
+                    best = Some(Candidate {
+                        ramps,
+                        round,
+                        error,
+                    });
+                }
+            }
+        }
+        best.ok_or(crate::Error::NoConvergence {
+            what: "the search for a weight scale",
+        })
+    }
+
+    /// A path, or nothing once the budget is spent.
+    fn path(
+        &mut self,
+        ramps: bool,
+        kept: Vec<usize>,
+        rounds: usize,
+        held: &[usize],
+    ) -> Result<Option<Vec<(Round, Array1<f64>)>>> {
+        if self.left == 0 {
+            return Ok(None);
+        }
+        let seen = if ramps { &self.embedded } else { &self.plain };
+        let mut path = Path::new(seen, kept, self.neurons, self.left)?;
+        let found = path.run(rounds, held)?;
+        let trials = path.trials;
+        self.left = self.left.saturating_sub(trials.len());
+        self.trials.extend(trials);
+        Ok(Some(found))
+    }
+
+    fn mean(&self, held: &[usize], squares: &Array1<f64>) -> f64 {
+        match &self.plain.weights {
+            None => squares.sum() / held.len() as f64,
+            Some(weights) => {
+                let weights = weights.select(Axis(0), held);
+                squares.dot(&weights) / weights.sum()
+            }
+        }
+    }
+
+    /// The round that was chosen: of three folds on all rows, else as the path of most rows left it.
+    fn settle(&mut self, best: &Candidate) -> Result<Round> {
+        let rows = self.plain.x.nrows();
+        if rows <= FEW_ROWS {
+            let all = (0..rows).collect();
+            if let Some(found) = self.path(best.ramps, all, best.round, &[])?
+                && let Some((round, _)) = found.into_iter().nth(best.round)
+            {
+                return Ok(round);
+            }
+        }
+        let last = self.last[usize::from(best.ramps)].as_mut();
+        let found = last.and_then(|rounds| rounds.get(best.round).cloned());
+        found.ok_or(crate::Error::NoConvergence {
+            what: "the search for a weight scale",
+        })
+    }
+}
