@@ -319,7 +319,7 @@ impl<A: Real> Kernel<A> for Packed<A> {
                     transform.values(targets, iz, oz, &mut value);
                     for (out, &weight) in out.iter_mut().zip(weights) {
                         for (sum, &value) in out.0.iter_mut().zip(&value.0) {
-                            *sum = *sum + weight * value;
+                            *sum += weight * value;
                         }
                     }
                 }

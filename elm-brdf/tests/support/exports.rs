@@ -1,5 +1,8 @@
 //! Models of everything that can be exported, and how far an evaluation in single precision may be off.
 
+// Each test program uses a part of it.
+#![allow(dead_code)]
+
 use elm::advanced::NeuronBlock;
 use elm::{Activation, Biases, ElmParams, NeuronGroup, solve::Ridge};
 use elm_brdf::features::Features;

@@ -210,7 +210,7 @@ impl Problem<'_> {
     ) -> Option<(Array1<f64>, f64)> {
         let steps = (0..30).map(|halvings| 0.5_f64.powi(halvings));
         let at = |length: f64| point - &step.mapv(|s| s * length);
-        let points = steps.map(|length| at(length));
+        let points = steps.map(at);
         let mut tried = points.map(|next| {
             let loss = self.loss(&next);
             (next, loss)

@@ -292,7 +292,7 @@ mod tests {
             let problem = problem.with_intercept(true);
             let any = Solver::from(Ridge::relative(1e-3)).solve(&problem).unwrap();
             let largest = any.diagnosis.largest_singular_value;
-            let scale = weights.map_or(90.0, |w| w.sum() / 5.0);
+            let scale = weights.as_ref().map_or(90.0, |w| w.sum() / 5.0);
             let relative = strength(found.step) * scale / (largest * largest);
             let expected = Solver::from(Ridge::relative(relative)).solve(&problem);
             let expected = expected.unwrap();

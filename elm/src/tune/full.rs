@@ -129,6 +129,9 @@ fn narrow<A: Scalar>(embedding: Embedding<f64>) -> Result<Embedding<A>> {
     })
 }
 
+/// The rounds of a path, each with the squared errors of the rows that it did not see.
+type Rounds = Vec<(Round, Array1<f64>)>;
+
 struct FullSearch {
     plain: Seen,
     embedded: Seen,
@@ -206,7 +209,7 @@ impl FullSearch {
         kept: Vec<usize>,
         rounds: usize,
         held: &[usize],
-    ) -> Result<Option<Vec<(Round, Array1<f64>)>>> {
+    ) -> Result<Option<Rounds>> {
         if self.left == 0 {
             return Ok(None);
         }
