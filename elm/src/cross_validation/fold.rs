@@ -52,7 +52,6 @@ impl<A: Scalar> Fold<A> {
     /// Groups rows by label and prepares each group.
     pub(super) fn divide(validator: &CrossValidator<A>, labels: &[usize]) -> Result<Vec<Self>> {
         check_length("fold labels", labels.len(), validator.rows())?;
-        check_several("fold labels", labels)?;
         let spectrum = &validator.rows.spectrum;
         let frame = &spectrum.frame;
         let mut groups: BTreeMap<usize, (Vec<usize>, Vec<usize>)> = BTreeMap::new();

@@ -5,7 +5,7 @@ use ndarray::{Array2, ArrayView1, ArrayView2};
 use super::ElmParams;
 use crate::bounds::Bounds;
 use crate::check::check_length;
-use crate::cross_validation::{CrossValidator, CvPredictions, FoldPredictions};
+use crate::cross_validation::{CrossValidator, CvPredictions, FoldPredictions, check_several};
 use crate::dataset::{Dataset, Inputs, Rows, TargetDim, Targets};
 use crate::error::{Error, Result};
 use crate::feature_map::{FeatureMap, FeatureRows};
@@ -108,6 +108,7 @@ impl<A: Scalar> ElmParams<A> {
         if let (Solver::Ridge(ridge), Some(groups)) = (self.solver, data.groups())
             && ridge.lambda() == Lambda::LeaveOneOut
         {
+            check_several("groups", groups)?;
             let design = Self::design(data.inputs(), &map)?;
             let weights = data.weights();
             let problem = self.problem(&design, data.target_matrix(), weights.as_ref())?;
@@ -191,6 +192,7 @@ impl<A: Scalar> ElmParams<A> {
             Solver::PseudoInverse(_) => None,
             Solver::Ridge(ridge) => Some(ridge),
         };
+        check_several("fold labels", folds)?;
         let validator = self.validator(data)?;
         let lambda = match ridge {
             Some(ridge) => validator.select_lambda_by_folds(folds, ridge)?,
