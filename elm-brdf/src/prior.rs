@@ -418,5 +418,5 @@ impl TryFrom<File> for Prior {
 impl Persist for Prior {
     const KIND: &'static str = "elm-brdf prior";
     const SCALAR: &'static str = "f64";
-    const VERSION: u32 = 3;
+    const VERSION: u32 = 4;
 }

@@ -89,8 +89,8 @@ impl MaterialTable {
     /// measured table (MERL, RGL), shown as it is.
     ///
     /// # Errors
-    /// Those of [`Format::of`] but [`UnknownFormat`](elm_datasets::Error::UnknownFormat), for such a file is a
-    /// model's.
+    /// Those of [`Format::of`] but [`UnknownFormat`](elm_datasets::Error::UnknownFormat), for such a file is
+    /// a model's.
     pub fn of_file(path: &Path) -> Result<Self> {
         let file = Some(path.to_owned());
         let none = Self::default();

@@ -149,8 +149,8 @@ impl FromStr for TargetTransform {
     }
 }
 
-/// A [`TargetTransform`] that knows the scale of each channel; of many channels, what their targets have in common too,
-/// so that a network needs fewer outputs than there are channels.
+/// A [`TargetTransform`] that knows the scale of each channel; of many channels, what their targets have in
+/// common too, so that a network needs fewer outputs than there are channels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FittedTransform {
     channels: Vec<Channel>,
@@ -346,8 +346,8 @@ impl FittedTransform {
     /// the offset below 0.
     ///
     /// # Errors
-    /// [`Error::Shape`] for another number of channels than the transform was fitted to; [`Error::Conflict`] where
-    /// values are colours, which no spectrum follows from.
+    /// [`Error::Shape`] for another number of channels than the transform was fitted to; [`Error::Conflict`]
+    /// where values are colours, which no spectrum follows from.
     pub fn to_targets(&self, values: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
         if self.color.is_some() {
             return Err(Error::Conflict {

@@ -24,8 +24,8 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use support::Program;
 
-/// A colored metal in a lacquer of another color, from 400 nm in steps of 25: no exact sum of two spectra, for
-/// the metal whitens towards grazing.
+/// A colored metal in a lacquer of another color, from 400 nm in steps of 25: no exact sum of two spectra,
+/// for the metal whitens towards grazing.
 fn lacquer(pair: &DirectionPair) -> [f64; 13] {
     let between = pair.cos_between();
     let cos_d = ((1.0 + between) / 2.0).max(0.0).sqrt();
@@ -83,8 +83,8 @@ fn few_outputs_serve_many_wavelengths_and_all_that_is_stored_counts() {
             (model.channels(), model.target_transform().outputs()),
             (13, outputs)
         );
-        // Output weights and constants; three numbers for each of the inputs; offset, largest value, mean and parts
-        // of the axes for each wavelength; and a bit for each neuron drawn.
+        // Output weights and constants; three numbers for each of the inputs; offset, largest value, mean and
+        // parts of the axes for each wavelength; and a bit for each neuron drawn.
         let inputs = model.network().inputs();
         let fixed = outputs * 61 + 3 * inputs + 13 * (3 + outputs);
         let found = model.stored_floats();
@@ -317,8 +317,8 @@ fn lab([r, g, b]: [f64; 3]) -> [f64; 3] {
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }
 
-/// G. Sharma, W. Wu, E. Dalal, *The CIEDE2000 Color-Difference Formula*, Color Research and Application 30(1),
-/// 2005, equations 2 to 22.
+/// G. Sharma, W. Wu, E. Dalal, *The CIEDE2000 Color-Difference Formula*, Color Research and Application
+/// 30(1), 2005, equations 2 to 22.
 fn ciede2000([l1, a1, b1]: [f64; 3], [l2, a2, b2]: [f64; 3]) -> f64 {
     let mean_c = f64::midpoint(a1.hypot(b1), a2.hypot(b2)).powi(7);
     let g = 0.5 * (1.0 - (mean_c / (mean_c + 25.0_f64.powi(7))).sqrt());

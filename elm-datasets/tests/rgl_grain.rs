@@ -31,8 +31,8 @@ fn half(pair: &DirectionPair) -> [f64; 3] {
     sum.map(|part| part / length)
 }
 
-/// Pairs with light from the elevations of the files and these azimuths, the viewer not near the horizon, where
-/// the shadowing is too steep for tables this coarse.
+/// Pairs with light from the elevations of the files and these azimuths, the viewer not near the horizon,
+/// where the shadowing is too steep for tables this coarse.
 fn pairs(rows: usize, phi_i: impl Fn(usize) -> f64) -> Vec<DirectionPair> {
     let drawn = Sampling::Random { rows, seed: 3 }.directions().unwrap();
     let at = |(k, pair): (usize, DirectionPair)| Angles {

@@ -157,8 +157,8 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
 
     /// Draws the random layer for rows like those of `x`, shape (rows, inputs): inputs are
     /// standardized by their means and deviations, and biases laid on them, where the parameters
-    /// say so, and ramps lie between their quantiles. The rows are not pushed. One sample gives accumulators that can be merged. Rows unlike
-    /// the sample are refused; see [`push`](Self::push).
+    /// say so, and ramps lie between their quantiles. The rows are not pushed. One sample gives accumulators
+    /// that can be merged. Rows unlike the sample are refused; see [`push`](Self::push).
     ///
     /// # Errors
     /// [`Error::Empty`] and [`Error::NotFinite`] for `x`, and those of

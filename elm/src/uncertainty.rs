@@ -27,7 +27,8 @@
 //! Of rows with weights, a row of weight $w$ is taken for an observation whose noise has the variance
 //! $\sigma^2 / w$, and a new observation for one of the mean weight. Rows of one
 //! [group](Dataset::with_groups) are left out together: the intervals are those of new groups, from the
-//! groups' held-out errors (CV+ in the same paper, not studentized), and $\sigma^2$ is the mean square of those.
+//! groups' held-out errors (CV+ in the same paper, not studentized), and $\sigma^2$ is the mean square of
+//! those.
 //!
 //! Both take the random layer, its standardization and $\lambda$ as given. Where these were chosen on
 //! the same rows, as $\lambda$ is by default and everything by [`ElmParams::auto`], nothing is

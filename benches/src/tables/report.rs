@@ -64,7 +64,7 @@ impl Figures {
         let mut page = format!(
             "# Real tables\n\n    {command}\n\nTest RMSE over the standard deviation of the test \
              targets, mean of {splits} splits of three quarters of the rows, 5,000 at most, and the \
-             rest. `auto` is `ElmParams::auto()`, `quick` its quick level; the others are \
+             rest. `auto` is `ElmParams::auto()`, `full` its full level; the others are \
              scikit-learn's, settings chosen on a quarter of the training rows \
              (`benches/peers/tables.py`). {about} In brackets the seconds of processor time, one \
              thread each.\n\n| table | rows x inputs |"

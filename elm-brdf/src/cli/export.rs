@@ -130,16 +130,15 @@ impl Arguments {
 
     /// What is exported as `format`.
     fn material(&self, format: Format) -> Result<Exported, Failure> {
-        let samples = self.samples()?;
         if self.exact {
-            let name = samples.unwrap_or(&self.model);
+            let name = self.model.as_str();
+            if name.starts_with("curet:") || name.starts_with("synthetic:") {
+                return Err(no_table(name));
+            }
             let table = measured_table(Path::new(name), !self.keeps_spectra(format));
             let (brdf, channels) = table.map_err(|error| match error {
                 Error::UnknownName { .. }
-                | Error::Data(elm_datasets::Error::UnknownFormat { .. }) => usage(format!(
-                    "--exact resamples a table, and {name} is none: expected a MERL .binary or an RGL \
-                     .bsdf file"
-                )),
+                | Error::Data(elm_datasets::Error::UnknownFormat { .. }) => no_table(name),
                 error => error.into(),
             })?;
             return Ok(Exported {
@@ -148,7 +147,7 @@ impl Arguments {
                 about: format!("{name}, resampled by elm-brdf"),
             });
         }
-        let model = match samples {
+        let model = match self.samples()? {
             None => file::load::<BrdfModel>(Path::new(&self.model))?,
             Some(samples) => self.fitted(samples)?,
         };
@@ -180,6 +179,12 @@ impl Arguments {
         about.channels = material.samples.channels;
         Ok(model.clone().with_provenance(about))
     }
+}
+
+fn no_table(name: &str) -> Failure {
+    usage(format!(
+        "--exact resamples a table, and {name} is none: expected a MERL .binary or an RGL .bsdf file"
+    ))
 }
 
 /// What is exported: values in 1/sr, the names of their channels, and where they come from.

@@ -20,8 +20,9 @@ use crate::scenes::builtin;
 ///
 /// SCENE is a TOML file, a built-in scene (builtin:materials, builtin:contact-sheet,
 /// builtin:comparison or builtin:mesh), or a file of one's own, which builtin:mesh then shows: a saved
-/// model, measurements, or a measured table (MERL, RGL). Measurements of CUReT are looked for as by 'reproduce'; without
-/// CUReT's files its materials come from the built-in synthetic data, and the caption says so.
+/// model, measurements, or a measured table (MERL, RGL). Measurements of CUReT are looked for as by
+/// 'reproduce'; without CUReT's files its materials come from the built-in synthetic data, and the caption
+/// says so.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// TOML file, builtin:NAME, or a material's file.

@@ -101,8 +101,8 @@ fn embed<'a, A: Scalar>(
 }
 
 impl<A: Scalar> FeatureMap<A> {
-    /// A map without ramps of these parts: `scaler` is that of the training rows, `None` for inputs that are taken as
-    /// they are.
+    /// A map without ramps of these parts: `scaler` is that of the training rows, `None` for inputs that are
+    /// taken as they are.
     ///
     /// # Errors
     /// [`Error::Shape`], [`Error::Empty`] and [`Error::NotFinite`] for parts that do not fit.

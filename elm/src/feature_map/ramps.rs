@@ -36,8 +36,8 @@ pub enum Embedding<A: Scalar> {
 ///
 /// A weighted sum of an input and its ramps is any function of that input that is straight between
 /// edges (a piecewise linear encoding: Gorishniy, Rubachev and Babenko, On embeddings for numerical
-/// features in tabular deep learning, 2022). What a random layer sees of a skewed input, or of one whose effect
-/// has a kink, is then at the scale of the rows, not of the units; and a
+/// features in tabular deep learning, 2022). What a random layer sees of a skewed input, or of one whose
+/// effect has a kink, is then at the scale of the rows, not of the units; and a
 /// [scale for each ramp](crate::ElmParams::with_input_scales) bends the axis where the targets ask for it.
 ///
 /// ```

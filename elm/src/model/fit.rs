@@ -137,8 +137,8 @@ impl<A: Scalar> ElmParams<A> {
     /// has one label per row, and rows of one label are predicted by the fit to all others.
     ///
     /// Ridge has the same strength in every fold, given or chosen by the errors of these folds in place of
-    /// leave-one-out, and inputs are standardized on all rows; [`cross_validation`](crate::cross_validation) says what that leaks.
-    /// Predictions are not held to the [`bounds`](crate::bounds) of the other rows.
+    /// leave-one-out, and inputs are standardized on all rows; [`cross_validation`](crate::cross_validation)
+    /// says what that leaks. Predictions are not held to the [`bounds`](crate::bounds) of the other rows.
     ///
     /// # Errors
     /// Those of [`fit`](Self::fit) for the data and of [`CrossValidator::k_fold`];

@@ -261,7 +261,6 @@ fn whole(lower: &Array2<f64>) -> Array2<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::{LeastSquares, Ridge, Solver};
     use ndarray::concatenate;
 
     fn wave(rows: usize, columns: usize, step: f64) -> Array2<f64> {
@@ -284,20 +283,21 @@ mod tests {
             )
             .unwrap();
             let found = columns.solve(h.view(), FIRST_STEP).unwrap();
-            // The same strength, relative to the largest squared singular value.
-            let mut problem = LeastSquares::new(&all, &t).unwrap();
-            if let Some(weights) = &weights {
-                problem = problem.with_weights(weights).unwrap();
-            }
-            let problem = problem.with_intercept(true);
-            let any = Solver::from(Ridge::relative(1e-3)).solve(&problem).unwrap();
-            let largest = any.diagnosis.largest_singular_value;
-            let scale = weights.as_ref().map_or(90.0, |w| w.sum() / 5.0);
-            let relative = strength(found.step) * scale / (largest * largest);
-            let expected = Solver::from(Ridge::relative(relative)).solve(&problem);
-            let expected = expected.unwrap();
-            approx::assert_relative_eq!(found.beta, expected.beta, max_relative = 1e-6);
-            approx::assert_relative_eq!(found.intercept, expected.intercept, max_relative = 1e-6);
+            // The normal equations of all columns at once, about weighted means.
+            let roots = weights
+                .as_ref()
+                .map(|w| (w / w.mean().unwrap()).mapv(f64::sqrt));
+            let (x, mean) = center(all.view(), roots.as_ref());
+            let (y, target_mean) = center(t.view(), roots.as_ref());
+            let mut gram = whole(&f64::gram(x.view()));
+            gram.diag_mut()
+                .mapv_inplace(|d| d + 90.0 * strength(found.step));
+            let factor = f64::cholesky(gram).unwrap();
+            let half = f64::solve_lower(&factor, x.t().dot(&y).view()).unwrap();
+            let beta = f64::solve_lower_transposed(&factor, half.view()).unwrap();
+            let intercept = &target_mean - &beta.t().dot(&mean);
+            approx::assert_relative_eq!(found.beta, beta, max_relative = 1e-6);
+            approx::assert_relative_eq!(found.intercept, intercept, max_relative = 1e-6);
         }
     }
 

@@ -25,10 +25,10 @@
 //! An error at a scale below the one that the search begins at counts 6 % more for each decade: networks
 //! that are nearly polynomials have large output weights, which cancel among the rows and nowhere else.
 //!
-//! At the [full level](Level::Full), that of `auto`, neurons also see [ramps](crate::Ramps) along the inputs,
-//! with a scale for each input and ramp by the slopes of the network before, in rounds. Within a round scale and
-//! strength are chosen by generalized cross-validation; the number of rounds, and whether there are ramps,
-//! by errors of rows that neither weights nor slopes have seen.
+//! At the [full level](Level::Full) neurons also see [ramps](crate::Ramps) along the inputs, with a scale for
+//! each input and ramp by the slopes of the network before, in rounds. Within a round scale and strength are
+//! chosen by generalized cross-validation; the number of rounds, and whether there are ramps, by errors of
+//! rows that neither weights nor slopes have seen.
 //!
 //! A trial looks at 2000 rows at most. With `auto` nearly all trials are of a hundred neurons, some
 //! ten milliseconds each; at most nine are of more.
@@ -166,8 +166,8 @@ pub struct Tuner<A: Scalar> {
 
 impl<A: Scalar> ElmParams<A> {
     /// Chooses everything: neurons, weight scale, a scale per input, direct links and regularization, for
-    /// tanh neurons with their biases on the data; ramps along the inputs, and a scale for each of them, where that
-    /// is better on rows held out ([`Level::Full`]). [`quick`](Tuner::quick) leaves those out.
+    /// tanh neurons with their biases on the data. [`full`](Tuner::full) also tries ramps along the inputs,
+    /// and a scale for each of them.
     #[must_use]
     pub fn auto() -> Tuner<A> {
         let base = Self::new(1)
@@ -177,7 +177,6 @@ impl<A: Scalar> ElmParams<A> {
             neurons: None,
             per_input: true,
             try_links: true,
-            level: Level::Full,
             ..base.tuner()
         }
     }
@@ -226,10 +225,10 @@ impl<A: Scalar> Tuner<A> {
         self.level
     }
 
-    /// The search of [`Level::Quick`]: a fraction of the time, for problems that are fitted often.
+    /// The search of [`Level::Full`]: for tables of real columns, in some ten times the time.
     #[must_use]
-    pub fn quick(self) -> Self {
-        self.with_level(Level::Quick)
+    pub fn full(self) -> Self {
+        self.with_level(Level::Full)
     }
 
     /// Factorizations of the quick search.

@@ -50,7 +50,7 @@ fn the_search_counts_rows_by_their_weights() {
     let data = Dataset::new(&x, &t).unwrap();
     let blind = ElmParams::auto().tune(&data).unwrap().model;
     let weighted = data.with_weights(&weights).unwrap();
-    for tuner in [ElmParams::auto(), ElmParams::auto().quick()] {
+    for tuner in [ElmParams::auto().full(), ElmParams::auto()] {
         let tuned = tuner.tune(&weighted).unwrap();
         let (with, without) = (
             error(&tuned.model, &other, &exact),
@@ -210,7 +210,7 @@ fn a_factor_of_all_weights_and_rows_of_none_change_no_search_and_no_interval() {
     let close = |a: &Array1<f64>, b: &Array1<f64>| {
         approx::assert_relative_eq!(a, b, max_relative = 1e-4, epsilon = 1e-4);
     };
-    for tuner in [ElmParams::auto(), ElmParams::auto().quick()] {
+    for tuner in [ElmParams::auto().full(), ElmParams::auto()] {
         let (one, same) = (tuner.tune(&all).unwrap(), tuner.tune(&omitted).unwrap());
         close(
             &one.model.predict(&other).unwrap(),

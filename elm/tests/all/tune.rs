@@ -74,7 +74,6 @@ fn neurons_are_doubled_only_while_that_pays() {
         Array1::random_using(400, StandardNormal, &mut ChaCha8Rng::seed_from_u64(6));
     let straight = x.column(0).mapv(|x| 3.0 * x) + 0.1 * noise;
     let line = ElmParams::auto()
-        .quick()
         .tune(&Dataset::new(&x, &straight).unwrap())
         .unwrap();
     assert!(line.best.neurons <= 200, "{}", line.best.neurons);
@@ -82,7 +81,6 @@ fn neurons_are_doubled_only_while_that_pays() {
     let waves = x.column(0).mapv(|x| (150.0 * x).sin());
     let x = x.select(Axis(1), &[0]);
     let waves = ElmParams::auto()
-        .quick()
         .tune(&Dataset::new(&x, &waves).unwrap())
         .unwrap();
     assert!(
@@ -123,12 +121,10 @@ fn k_fold_sees_through_rows_that_are_copies_of_each_other() {
     let twice = |a: &Array2<f64>| ndarray::concatenate(Axis(0), &[a.view(), a.view()]).unwrap();
     let (x, t) = (twice(&x), twice(&t.insert_axis(Axis(1))));
     let k_fold = ElmParams::auto()
-        .quick()
         .with_criterion(Criterion::KFold(5))
         .tune(&Dataset::new(&x, &t).unwrap())
         .unwrap();
     let one_out = ElmParams::auto()
-        .quick()
         .tune(&Dataset::new(&x, &t).unwrap())
         .unwrap();
     // With its copy still there a row is easily predicted.

@@ -298,7 +298,10 @@ fn a_path_has_the_scores_of_its_strengths_and_finds_the_best() {
         }
         assert!(lambdas.contains(&path.best_shared()));
     }
-    // The path of leave-one-out is what ridge chooses by.
+    // The path of leave-one-out is what ridge chooses by where rows are alike; other weights it would take
+    // for noise.
+    let problem = Problem::noisy(normal::<f64>(30, 20, 1), 2, 3.0, 2);
+    let validator = CrossValidator::new(&problem.view()).unwrap();
     assert_eq!(
         validator.leave_one_out_path(&lambdas).unwrap().best(),
         validator.select_lambda(Ridge::leave_one_out()).unwrap()

@@ -59,12 +59,12 @@ fn part(
     )
 }
 
-/// Whether these measurements (BRDF in 1/sr, shape (pairs, channels)) show a surface that looks different after
-/// half a turn about its normal, such as velvet that was stroked or facets that lean to one side. No set of
-/// [`Features`] can tell that: a network is fitted as if it looked the same.
+/// Whether these measurements (BRDF in 1/sr, shape (pairs, channels)) show a surface that looks different
+/// after half a turn about its normal, such as velvet that was stroked or facets that lean to one side. No
+/// set of [`Features`] can tell that: a network is fitted as if it looked the same.
 ///
-/// Polynomials in the inputs, those of a grain included, predict rows left out better by a tenth with terms that
-/// change sign after half a turn.
+/// Polynomials in the inputs, those of a grain included, predict rows left out better by a tenth with terms
+/// that change sign after half a turn.
 ///
 /// # Errors
 /// Those of [`Fit::fit`](crate::fit::Fit::fit) for measurements that cannot be fitted.

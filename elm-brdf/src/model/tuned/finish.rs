@@ -183,8 +183,8 @@ impl Problem<'_> {
         Ok(whole.map(|weights| (predicted, weights)))
     }
 
-    /// What squared errors of each output are relative to: the variance of its targets, which for coordinates in
-    /// a basis is that of all together, as they are of one unit.
+    /// What squared errors of each output are relative to: the variance of its targets, which for coordinates
+    /// in a basis is that of all together, as they are of one unit.
     fn spread(&self) -> Vec<f64> {
         let columns = self.targets.columns().into_iter();
         let spread: Vec<f64> = columns.map(|t| t.var(0.0).max(1e-300)).collect();

@@ -121,8 +121,8 @@ fn finished(problem: &Problem<'_>, setting: &Setting, rows: &[usize]) -> Result<
     problem.finish(setting.set, &layer, &x)
 }
 
-/// `transform` with as many outputs as the error at the rows that judge asks for, each number of them with the neurons
-/// that the limits leave for it.
+/// `transform` with as many outputs as the error at the rows that judge asks for, each number of them with
+/// the neurons that the limits leave for it.
 pub(super) fn with_outputs(
     tuned: &Tuned,
     transform: FittedTransform,

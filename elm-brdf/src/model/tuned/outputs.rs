@@ -22,8 +22,8 @@ pub(super) struct Judge<'a> {
 }
 
 impl Judge<'_> {
-    /// The metric, or where RMSE is asked for, which a few bright rows decide, that of the targets, the largest
-    /// errors cut off. `targets` are predicted ones of all channels.
+    /// The metric, or where RMSE is asked for, which a few bright rows decide, that of the targets, the
+    /// largest errors cut off. `targets` are predicted ones of all channels.
     fn error(
         &self,
         metric: Metric,
@@ -40,8 +40,9 @@ impl Judge<'_> {
 }
 
 impl Tuned {
-    /// `transform` with a basis of the outputs that are good enough, or as it is for few channels. Its basis is found
-    /// from `values`; `predict` gives, for a basis of the most outputs, so many of them predicted at the rows of
+    /// `transform` with a basis of the outputs that are good enough, or as it is for few channels. Its basis
+    /// is found from `values`; `predict` gives, for a basis of the most outputs, so many of them predicted at
+    /// the rows of
     /// `judge`, `None` where the limits leave no room for so many.
     pub(super) fn with_outputs(
         &self,
