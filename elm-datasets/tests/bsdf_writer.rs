@@ -1,6 +1,6 @@
 //! Files that are written of models: read back, and held against what pbrt-v4 demands of them.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};

@@ -28,6 +28,12 @@ pub enum ExportError {
         /// The number.
         value: f64,
     },
+    /// A name that Mitsuba uses itself.
+    #[error("Mitsuba 3 has a material called '{name}' itself: choose another with --name")]
+    Taken {
+        /// The name.
+        name: String,
+    },
     /// A name that no language takes for its functions.
     #[error("'{name}' cannot begin the name of a function (expected letters, digits and _)")]
     Name {

@@ -16,6 +16,34 @@ use elm_datasets::rgl::Channels;
 
 const TEMPLATE: &str = include_str!("mitsuba.py");
 
+/// Mitsuba's own materials, which it prefers to a plug-in of the same name.
+const TAKEN: [&str; 24] = [
+    "blendbsdf",
+    "bumpmap",
+    "circular",
+    "conductor",
+    "dielectric",
+    "diffuse",
+    "hair",
+    "mask",
+    "measured",
+    "measured_polarized",
+    "normalmap",
+    "null",
+    "opacitymask",
+    "plastic",
+    "polarizer",
+    "pplastic",
+    "principled",
+    "principledthin",
+    "retarder",
+    "roughconductor",
+    "roughdielectric",
+    "roughplastic",
+    "thindielectric",
+    "twosided",
+];
+
 /// The source of the plug-in, to be called by the file's `module` name and registered as `name`.
 ///
 /// In variants without wavelengths a spectrum is integrated to linear sRGB under D65; in spectral ones red,
@@ -27,6 +55,10 @@ const TEMPLATE: &str = include_str!("mitsuba.py");
 /// model that single precision would spoil.
 pub fn plugin(model: &BrdfModel, module: &str, name: &str) -> Result<String> {
     check_name(name)?;
+    if TAKEN.contains(&name) {
+        let name = name.to_owned();
+        return Err(ExportError::Taken { name }.into());
+    }
     let model = &model.in_rgb_order()?;
     let count = model.channels();
     let (channels, places) = match count {

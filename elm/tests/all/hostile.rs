@@ -192,10 +192,14 @@ fn folds_that_leave_nothing_are_named() {
                 .with_solver(solver)
                 .with_intercept(intercept);
             let checked = params;
-            match checked.cross_val_predict(&Dataset::new(&x, &t).unwrap(), &all_one) {
-                Err(Error::Parameter { name, .. }) => assert_eq!(name, "fold labels"),
-                other => panic!("{other:?}"),
-            }
+            let refused = checked.cross_val_predict(&Dataset::new(&x, &t).unwrap(), &all_one);
+            assert!(matches!(
+                refused,
+                Err(Error::Parameter {
+                    name: "fold labels",
+                    ..
+                })
+            ));
             assert!(
                 checked
                     .cross_val_predict(&Dataset::new(&x, &t).unwrap(), &singles)
