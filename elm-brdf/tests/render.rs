@@ -312,7 +312,7 @@ fn impossible_scenes_are_errors_of_one_line_that_name_the_place() {
         ),
         (
             with("", &SPHERE.replace("[0, 0, 0]", "[inf, 0, 0]")),
-            "centre is [inf, 0.0, 0.0]",
+            "center is [inf, 0.0, 0.0]",
         ),
         (
             with(

@@ -68,6 +68,9 @@ pub(super) struct Arguments {
 /// The built-in scene that shows the material of a file.
 const PREVIEW: &str = "mesh";
 
+/// What the names of materials' files end in; any other file is a scene.
+const MATERIALS: [&str; 8] = ["elm", "json", "csv", "tsv", "gz", "binary", "bsdf", "brdf"];
+
 /// Reads WIDTHxHEIGHT.
 fn size(text: &str) -> Result<(u32, u32), String> {
     let parts = text
@@ -133,10 +136,12 @@ impl Arguments {
     /// A scene's file, or the built-in scene that shows the material of a file.
     fn scene_file(&self) -> Result<Sheet, Failure> {
         let path = Path::new(&self.scene);
-        let is_scene = path
-            .extension()
-            .is_some_and(|end| end.eq_ignore_ascii_case("toml"));
-        if is_scene || !path.is_file() {
+        let is_material = path.extension().is_some_and(|end| {
+            MATERIALS
+                .iter()
+                .any(|known| end.eq_ignore_ascii_case(known))
+        });
+        if !is_material || !path.is_file() {
             return Ok(Scene::read(path).map_err(Error::from)?.into());
         }
         if self.material.is_some() {
