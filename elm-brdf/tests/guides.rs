@@ -33,7 +33,11 @@ fn every_command_of_the_guide_to_materials_succeeds() {
     let guide = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/guides/materials.md");
     let text = fs::read_to_string(guide).unwrap();
     let dir = tempfile::tempdir().unwrap();
-    for (name, rows, seed) in [("paint.csv", 200, 1), ("other.csv", 50, 2)] {
+    for (name, rows, seed) in [
+        ("paint.csv", 200, 1),
+        ("other.csv", 50, 2),
+        ("directions.csv", 50, 3),
+    ] {
         let samples = paint::samples(rows, seed).unwrap();
         scattered::write(dir.path().join(name), &samples).unwrap();
     }
@@ -50,7 +54,7 @@ fn every_command_of_the_guide_to_materials_succeeds() {
         command.assert().success();
         run += 1;
     }
-    assert_eq!(run, 8);
+    assert_eq!(run, 11);
     for written in [
         "paint.elm",
         "paint.glsl",

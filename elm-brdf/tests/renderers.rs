@@ -126,7 +126,6 @@ fn what_a_renderer_cannot_take_is_refused_in_one_line_and_nothing_is_left() {
     let out = path("out.bsdf");
     for (model, extra, expected) in [
         ("two.elm", vec![], "red, green and blue"),
-        ("four.elm", vec![], "--spectral"),
         (
             "grey.elm",
             vec!["--spectral", "--resolution", "1"],
