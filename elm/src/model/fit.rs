@@ -192,6 +192,7 @@ impl<A: Scalar> ElmParams<A> {
             Solver::PseudoInverse(_) => None,
             Solver::Ridge(ridge) => Some(ridge),
         };
+        check_length("fold labels", folds.len(), data.rows())?;
         check_several("fold labels", folds)?;
         let validator = self.validator(data)?;
         let lambda = match ridge {
