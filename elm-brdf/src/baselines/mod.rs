@@ -5,7 +5,7 @@
 //! |---|---|---|
 //! | [`Analytic`]: Lambert to GGX on Oren-Nayar, Lafortune | a formula | 1 to 7 |
 //! | [`Koenderink`] of order 2 and 8 | isotropy, reciprocity | 5, 55 |
-//! | [`Neighbours`]: nearest, inverse distance | inputs | the measurements |
+//! | [`Neighbors`]: nearest, inverse distance | inputs | the measurements |
 //! | [`RadialBasis`]: thin plate, cubic | inputs, smoothness | the measurements |
 //! | [`GaussianProcess`] | inputs, smoothness of each | the measurements |
 //! | [`Nbrdf`]: a published network, read from its weights | half and difference vectors | 675 for three channels |

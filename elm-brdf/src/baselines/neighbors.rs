@@ -33,7 +33,7 @@ const POWERS: std::ops::RangeInclusive<i32> = 1..=8;
 /// The most rows that leave-one-out is measured on, evenly spread over all.
 const MAX_TRIALS: usize = 1000;
 
-/// Measurements kept by [`Neighbours`].
+/// Measurements kept by [`Neighbors`].
 pub struct NeighborsModel {
     frame: Frame,
     count: usize,

@@ -47,7 +47,8 @@ impl DirectionTable {
     ///
     /// # Errors
     /// - Those of [`Table::read`] for what is no table of numbers.
-    /// - [`Error::Scattered`] for directions that cannot be read, with the line and the [`Problem`].
+    /// - [`Error::Scattered`] for directions that cannot be read, with the line and the
+    ///   [`Problem`](super::Problem).
     pub fn read(
         path: impl AsRef<Path>,
         options: &Options,
