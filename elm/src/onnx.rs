@@ -187,7 +187,7 @@ fn activate<A: Scalar>(graph: &mut Graph, f: &Activation<A>, z: String) -> Resul
         Activation::HardLimit => {
             let zero = graph.row(&[0.0]);
             let at_least = graph.node("GreaterOrEqual", &[&z, &zero]);
-            graph.to_double(&at_least)
+            graph.cast_to_double(&at_least)
         }
         Activation::Isru => {
             let one = graph.row(&[1.0]);

@@ -14,6 +14,7 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
     }
 
     /// Number of outputs.
+    #[cfg(feature = "serde")]
     pub(crate) fn outputs(&self) -> usize {
         self.outputs
     }

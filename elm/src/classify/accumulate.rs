@@ -9,6 +9,7 @@ use super::labels::{LabeledRows, targets};
 use super::left_out::without;
 use super::{ElmClassifier, Parts, outputs};
 use crate::accumulate::Accumulator;
+#[cfg(feature = "serde")]
 use crate::check::check_length;
 use crate::dataset::{Dataset, Inputs};
 use crate::error::{Error, Result};

@@ -5,7 +5,9 @@ use ndarray::{Array1, Array2, ArrayRef1, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
 use crate::check::check_length;
-use crate::error::{Error, Result};
+#[cfg(feature = "serde")]
+use crate::error::Error;
+use crate::error::Result;
 use crate::scalar::Scalar;
 use crate::solve::Cholesky;
 

@@ -53,10 +53,10 @@ impl Graph {
 
     /// The inputs in double precision.
     pub(super) fn input(&mut self) -> String {
-        self.to_double("x")
+        self.cast_to_double("x")
     }
 
-    pub(super) fn to_double(&mut self, value: &str) -> String {
+    pub(super) fn cast_to_double(&mut self, value: &str) -> String {
         let name = self.name();
         self.push(
             "Cast",
