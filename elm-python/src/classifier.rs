@@ -5,12 +5,13 @@ use std::sync::OnceLock;
 use elm::classify::{ClassAccumulator, ClassPredictor, ClassWeights, LabeledRows};
 use elm::{ElmClassifier, Scalar, onnx, persist};
 use ndarray::{Array2, ArrayView1, ArrayView2};
-use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::pool::pool;
-use crate::regressor::{load, precision};
+use crate::regressor::precision;
+use crate::scalars::{Either, either, on_rows};
 use crate::settings::{Recipe, Settings, error};
 
 struct Packed<A: Scalar> {
@@ -97,24 +98,12 @@ fn fit<A: Scalar>(
     }
 }
 
-enum Kind {
-    F32(Packed<f32>),
-    F64(Packed<f64>),
-}
+type Kind = Either<Packed<f32>, Packed<f64>>;
 
 /// A fitted classifier of classes 0, 1 and so on.
 #[pyclass(frozen, module = "elm_learn._elm_learn")]
 pub(crate) struct Classifier {
     kind: Kind,
-}
-
-macro_rules! either {
-    ($kind:expr, $model:ident => $value:expr) => {
-        match $kind {
-            Kind::F32($model) => $value,
-            Kind::F64($model) => $value,
-        }
-    };
 }
 
 #[pymethods]
@@ -163,20 +152,7 @@ impl Classifier {
         x: &Bound<'py, PyAny>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        match &self.kind {
-            Kind::F64(model) => {
-                let x = x.extract::<PyReadonlyArray2<'_, f64>>()?;
-                let x = x.as_array();
-                let p = py.detach(|| model.probabilities(x, threads))?;
-                Ok(p.into_pyarray(py).into_any())
-            }
-            Kind::F32(model) => {
-                let x = x.extract::<PyReadonlyArray2<'_, f32>>()?;
-                let x = x.as_array();
-                let p = py.detach(|| model.probabilities(x, threads))?;
-                Ok(p.into_pyarray(py).into_any())
-            }
-        }
+        either!(&self.kind, model => on_rows(py, x, |x| model.probabilities(x, threads)))
     }
 
     fn decision_function<'py>(
@@ -184,20 +160,7 @@ impl Classifier {
         py: Python<'py>,
         x: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        match &self.kind {
-            Kind::F64(model) => {
-                let x = x.extract::<PyReadonlyArray2<'_, f64>>()?;
-                let x = x.as_array();
-                let z = py.detach(|| model.decisions(x))?;
-                Ok(z.into_pyarray(py).into_any())
-            }
-            Kind::F32(model) => {
-                let x = x.extract::<PyReadonlyArray2<'_, f32>>()?;
-                let x = x.as_array();
-                let z = py.detach(|| model.decisions(x))?;
-                Ok(z.into_pyarray(py).into_any())
-            }
-        }
+        either!(&self.kind, model => on_rows(py, x, |x| model.decisions(x)))
     }
 
     /// Leave-one-out RMSE of the 0 and 1 of each class, where the solver knows it.
@@ -223,10 +186,7 @@ impl Classifier {
 
     #[getter]
     fn dtype(&self) -> &'static str {
-        match &self.kind {
-            Kind::F32(_) => "float32",
-            Kind::F64(_) => "float64",
-        }
+        self.kind.dtype()
     }
 
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
@@ -236,9 +196,9 @@ impl Classifier {
 
     #[staticmethod]
     fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
-        let kind = match load::<ElmClassifier<f32, u32>, ElmClassifier<f64, u32>>(bytes)? {
-            Ok(single) => Kind::F32(Packed::of(single)),
-            Err(double) => Kind::F64(Packed::of(double)),
+        let kind = match Either::load(bytes)? {
+            Either::F32(model) => Kind::F32(Packed::of(model)),
+            Either::F64(model) => Kind::F64(Packed::of(model)),
         };
         Ok(Self { kind })
     }

@@ -5,6 +5,7 @@ mod brdf;
 mod classifier;
 mod pool;
 mod regressor;
+mod scalars;
 mod settings;
 
 use pyo3::prelude::*;

@@ -2,16 +2,17 @@
 
 use std::sync::OnceLock;
 
-use elm::persist::{self, Persist};
+use elm::persist;
 use elm::uncertainty::UncertainElm;
 use elm::{Accumulator, Dataset, Elm, Predictor, Scalar, onnx};
-use ndarray::{Array2, ArrayView1, ArrayView2, Ix2};
-use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
+use ndarray::{Array2, ArrayView1, ArrayView2, Axis, Ix2, concatenate};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::pool::pool;
+use crate::scalars::{Either, either, on_rows};
 use crate::settings::{Recipe, Settings, error};
 
 /// A network with its weights packed on first use.
@@ -31,6 +32,11 @@ impl<A: Scalar> Packed<A> {
             uncertain: None,
             input_scales: Vec::new(),
         }
+    }
+
+    fn uncertain(&self) -> PyResult<&UncertainElm<A>> {
+        let without = || PyTypeError::new_err("fitted without intervals");
+        self.uncertain.as_ref().ok_or_else(without)
     }
 
     fn predict(&self, x: ArrayView2<'_, A>, threads: usize) -> PyResult<Array2<A>> {
@@ -74,36 +80,12 @@ fn fit<A: Scalar>(
     Ok(packed)
 }
 
-enum Kind {
-    F32(Packed<f32>),
-    F64(Packed<f64>),
-}
+type Kind = Either<Packed<f32>, Packed<f64>>;
 
 /// A fitted network.
 #[pyclass(frozen, module = "elm_learn._elm_learn")]
 pub(crate) struct Network {
     kind: Kind,
-}
-
-/// Evaluates an expression for either type.
-macro_rules! either {
-    ($kind:expr, $model:ident => $value:expr) => {
-        match $kind {
-            Kind::F32($model) => $value,
-            Kind::F64($model) => $value,
-        }
-    };
-}
-
-/// Reads a file of either scalar type.
-pub(crate) fn load<S: Persist, D: Persist>(bytes: &[u8]) -> PyResult<Result<S, D>> {
-    match persist::from_bytes::<D>(bytes) {
-        Ok(double) => Ok(Err(double)),
-        Err(persist::Error::ScalarType { .. }) => {
-            persist::from_bytes::<S>(bytes).map(Ok).map_err(error)
-        }
-        Err(reason) => Err(error(reason)),
-    }
 }
 
 #[pymethods]
@@ -140,58 +122,23 @@ impl Network {
         x: &Bound<'py, PyAny>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        match &self.kind {
-            Kind::F64(model) => {
-                let x = x.extract::<PyReadonlyArray2<'_, f64>>()?;
-                let x = x.as_array();
-                let y = py.detach(|| model.predict(x, threads))?;
-                Ok(y.into_pyarray(py).into_any())
-            }
-            Kind::F32(model) => {
-                let x = x.extract::<PyReadonlyArray2<'_, f32>>()?;
-                let x = x.as_array();
-                let y = py.detach(|| model.predict(x, threads))?;
-                Ok(y.into_pyarray(py).into_any())
-            }
-        }
+        either!(&self.kind, model => on_rows(py, x, |x| model.predict(x, threads)))
     }
 
-    /// Lower and upper ends, shape (rows, outputs) each.
+    /// Lower and upper ends, shape (rows, 2 outputs): all lower ones, then all upper ones.
     fn predict_interval<'py>(
         &self,
         py: Python<'py>,
         x: &Bound<'py, PyAny>,
         coverage: f64,
-    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        match &self.kind {
-            Kind::F64(Packed {
-                uncertain: Some(model),
-                ..
-            }) => {
-                let x = x.extract::<PyReadonlyArray2<'_, f64>>()?;
-                let x = x.as_array();
-                let ends = py.detach(|| model.predict_interval(&x, coverage));
-                let (low, high) = ends.map_err(error)?;
-                Ok((
-                    low.into_pyarray(py).into_any(),
-                    high.into_pyarray(py).into_any(),
-                ))
-            }
-            Kind::F32(Packed {
-                uncertain: Some(model),
-                ..
-            }) => {
-                let x = x.extract::<PyReadonlyArray2<'_, f32>>()?;
-                let x = x.as_array();
-                let ends = py.detach(|| model.predict_interval(&x, coverage));
-                let (low, high) = ends.map_err(error)?;
-                Ok((
-                    low.into_pyarray(py).into_any(),
-                    high.into_pyarray(py).into_any(),
-                ))
-            }
-            _ => Err(PyTypeError::new_err("fitted without intervals")),
-        }
+    ) -> PyResult<Bound<'py, PyAny>> {
+        either!(&self.kind, model => {
+            let model = model.uncertain()?;
+            on_rows(py, x, |x| {
+                let (low, high) = model.predict_interval(&x, coverage).map_err(error)?;
+                Ok(concatenate![Axis(1), low, high])
+            })
+        })
     }
 
     /// Standard deviation of a new observation, shape (rows, outputs).
@@ -200,27 +147,10 @@ impl Network {
         py: Python<'py>,
         x: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        match &self.kind {
-            Kind::F64(Packed {
-                uncertain: Some(model),
-                ..
-            }) => {
-                let x = x.extract::<PyReadonlyArray2<'_, f64>>()?;
-                let x = x.as_array();
-                let sd = py.detach(|| model.predict_deviation(&x)).map_err(error)?;
-                Ok(sd.into_pyarray(py).into_any())
-            }
-            Kind::F32(Packed {
-                uncertain: Some(model),
-                ..
-            }) => {
-                let x = x.extract::<PyReadonlyArray2<'_, f32>>()?;
-                let x = x.as_array();
-                let sd = py.detach(|| model.predict_deviation(&x)).map_err(error)?;
-                Ok(sd.into_pyarray(py).into_any())
-            }
-            _ => Err(PyTypeError::new_err("fitted without intervals")),
-        }
+        either!(&self.kind, model => {
+            let model = model.uncertain()?;
+            on_rows(py, x, |x| model.predict_deviation(&x).map_err(error))
+        })
     }
 
     #[getter]
@@ -253,10 +183,7 @@ impl Network {
 
     #[getter]
     fn dtype(&self) -> &'static str {
-        match &self.kind {
-            Kind::F32(_) => "float32",
-            Kind::F64(_) => "float64",
-        }
+        self.kind.dtype()
     }
 
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
@@ -266,9 +193,9 @@ impl Network {
 
     #[staticmethod]
     fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
-        let kind = match load::<Elm<f32>, Elm<f64>>(bytes)? {
-            Ok(single) => Kind::F32(Packed::of(single)),
-            Err(double) => Kind::F64(Packed::of(double)),
+        let kind = match Either::load(bytes)? {
+            Either::F32(model) => Kind::F32(Packed::of(model)),
+            Either::F64(model) => Kind::F64(Packed::of(model)),
         };
         Ok(Self { kind })
     }

@@ -39,6 +39,7 @@ mod stats;
 pub mod testing;
 mod tracer;
 mod vector;
+mod vertex;
 
 pub use error::{Error, MeshProblem, Place, Result};
 pub use loader::{LoadError, LoadedMaterial, MaterialLoader};

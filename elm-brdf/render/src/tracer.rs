@@ -8,15 +8,14 @@ use crate::light::{Light, power_heuristic};
 use crate::material_cache::MaterialCache;
 use crate::random::{Purpose, numbers, pixel_seed};
 use crate::shading_queue::{CAPACITY, EvalRequest, SCATTERED, ShadingQueue};
-use crate::shape::{Ray, SurfacePoint};
+use crate::shape::Ray;
 use crate::stats::{Optimizations, Reason, TileStats};
-use crate::vector::{BLACK, Rgb, ShadingFrame, Vec3, add, largest, scaled, times};
-use elm_datasets::geometry::{DirectionPair, Vector};
+use crate::vector::{BLACK, Rgb, add, largest, scaled, times};
+use crate::vertex::Vertex;
+use elm_datasets::geometry::DirectionPair;
 
 /// Surfaces after which dim paths may end by chance.
 const ROULETTE_FROM: u32 = 3;
-/// Least cosine between the viewer and a smooth normal, which interpolation may tip away.
-const MIN_COSINE: f64 = 1e-3;
 /// Hashes up to here are of rays that met no surface.
 const MISSED: u64 = 1;
 
@@ -78,63 +77,6 @@ enum State {
     /// It goes on to another surface.
     Leaving(Ray, Hit),
     Ended,
-}
-
-/// A surface point with everything that depends on the viewer but not on the light.
-struct Vertex {
-    point: SurfacePoint,
-    /// About the shading normal, on the viewer's side.
-    frame: ShadingFrame,
-    geometric: Vec3,
-    outgoing: Vector,
-    material: usize,
-}
-
-impl Vertex {
-    fn new(point: SurfacePoint, material: usize, ray: &Ray) -> Self {
-        let to_viewer = -ray.direction;
-        let towards = |n: Vec3, w: Vec3| if n.dot(&w) < 0.0 { -n } else { n };
-        let geometric = towards(point.geometric, to_viewer);
-        let mut shading = towards(point.shading, geometric);
-        let cosine = shading.dot(&to_viewer);
-        if cosine < MIN_COSINE {
-            shading = (shading + to_viewer * (MIN_COSINE - cosine)).normalize();
-        }
-        let frame = ShadingFrame::with_tangent(shading, point.tangent);
-        Self {
-            point,
-            outgoing: frame.local(&to_viewer),
-            frame,
-            geometric,
-            material,
-        }
-    }
-
-    /// Whether a direction is below the surface, of the form or of the smooth surface.
-    fn is_below(&self, direction: Vec3, cosine: f64) -> bool {
-        cosine <= 0.0 || self.geometric.dot(&direction) <= 0.0
-    }
-
-    /// Where a ray in this direction starts: on the viewer's side, raised to the smooth surface.
-    fn ray(&self, direction: Vec3) -> Ray {
-        let lift = self.point.lifted - self.point.position;
-        let outwards = if lift.dot(&self.geometric) < 0.0 {
-            Vec3::zeros()
-        } else {
-            lift
-        };
-        Ray {
-            origin: self.point.position + outwards,
-            direction,
-        }
-    }
-
-    fn pair(&self, direction: Vec3) -> DirectionPair {
-        DirectionPair {
-            incident: self.frame.local(&direction),
-            outgoing: self.outgoing,
-        }
-    }
 }
 
 impl Tracer<'_> {

@@ -9,7 +9,7 @@ from numbers import Integral, Real
 import numpy as np
 from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
 
 from ._elm_learn import Settings
 
@@ -80,6 +80,13 @@ class ElmBase(BaseEstimator):
         if self._network is None:
             self._network = self._rows.fit()
         return self._network
+
+    @staticmethod
+    def _weights(X, sample_weight):
+        """Weights of rows of the type of the inputs, or None."""
+        if sample_weight is None:
+            return None
+        return _check_sample_weight(sample_weight, X, dtype=X.dtype, ensure_non_negative=True)
 
     def _work(self, X) -> float:
         if self.n_neurons == "auto" or self.scale == "loo":

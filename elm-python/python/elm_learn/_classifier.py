@@ -6,7 +6,6 @@ import numpy as np
 from sklearn.base import ClassifierMixin
 from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import (
-    _check_sample_weight,
     check_is_fitted,
     column_or_1d,
     validate_data,
@@ -120,11 +119,7 @@ class ElmClassifier(ClassifierMixin, ElmBase):
                 "ElmClassifier needs rows of at least 2 classes, but the data has only one class: "
                 f"{self.classes_[0]!r}"
             )
-        weights = None
-        if sample_weight is not None:
-            weights = _check_sample_weight(
-                sample_weight, X, dtype=X.dtype, ensure_non_negative=True
-            )
+        weights = self._weights(X, sample_weight)
         balanced = isinstance(self.class_weight, str) and self.class_weight == "balanced"
         arguments = (
             settings,
@@ -187,11 +182,7 @@ class ElmClassifier(ClassifierMixin, ElmBase):
         unknown = self.classes_[codes] != y
         if unknown.any():
             raise ValueError(f"the label {y[unknown][0]!r} is none of classes_")
-        weights = None
-        if sample_weight is not None:
-            weights = _check_sample_weight(
-                sample_weight, X, dtype=X.dtype, ensure_non_negative=True
-            )
+        weights = self._weights(X, sample_weight)
         if first:
             self._rows = ClassRows(self._settings(partial=True), X, len(self.classes_))
             self._importances = None

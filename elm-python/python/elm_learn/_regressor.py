@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from sklearn.base import RegressorMixin
-from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
+from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ._base import FLOATS, ElmBase, interruptible
 from ._elm_learn import Network, Rows
@@ -114,11 +114,7 @@ class ElmRegressor(RegressorMixin, ElmBase):
         )
         settings = self._settings()
         y = np.asarray(y, dtype=X.dtype)
-        weights = None
-        if sample_weight is not None:
-            weights = _check_sample_weight(
-                sample_weight, X, dtype=X.dtype, ensure_non_negative=True
-            )
+        weights = self._weights(X, sample_weight)
         self._single = y.ndim == 1
         targets = y[:, None] if self._single else y
         arguments = (settings, X, targets, weights, bool(self.intervals))
@@ -163,11 +159,7 @@ class ElmRegressor(RegressorMixin, ElmBase):
         X, y = validate_data(
             self, X, y, reset=first, dtype=np.float64, multi_output=True, y_numeric=True
         )
-        weights = None
-        if sample_weight is not None:
-            weights = _check_sample_weight(
-                sample_weight, X, dtype=X.dtype, ensure_non_negative=True
-            )
+        weights = self._weights(X, sample_weight)
         y = np.asarray(y, dtype=np.float64)
         targets = y[:, None] if y.ndim == 1 else y
         if first:
@@ -212,7 +204,7 @@ class ElmRegressor(RegressorMixin, ElmBase):
             Ends; infinite where there are too few rows for so small an `alpha`.
         """
         X = self._inputs(X)
-        low, high = self._uncertain().predict_interval(X, 1.0 - alpha)
+        low, high = np.split(self._uncertain().predict_interval(X, 1.0 - alpha), 2, axis=1)
         return (low[:, 0], high[:, 0]) if self._single else (low, high)
 
     def predict_std(self, X):

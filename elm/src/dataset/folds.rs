@@ -8,39 +8,36 @@ use crate::error::{Error, Result};
 use crate::memory::check_room;
 use crate::stream::Stream;
 
+fn check_folds(rows: usize, folds: usize) -> Result<()> {
+    if folds < 2 || folds > rows {
+        return Err(Error::Parameter {
+            name: "folds",
+            value: folds as f64,
+            expected: "at least 2 and at most the number of rows",
+        });
+    }
+    check_room("the fold labels", rows, 1)
+}
+
 /// Assigns each row to one of `folds` folds at random, sizes differing by at most 1; one seed
 /// gives one assignment on every platform.
 ///
 /// # Errors
 /// [`Error::Parameter`] unless $2 \le$ `folds` $\le$ `rows`; [`Error::TooLarge`].
 pub fn assign_folds(rows: usize, folds: usize, seed: u64) -> Result<Vec<usize>> {
-    if folds < 2 || folds > rows {
-        return Err(Error::Parameter {
-            name: "folds",
-            value: folds as f64,
-            expected: "at least 2 and at most the number of rows",
-        });
-    }
-    check_room("the fold labels", rows, 1)?;
+    check_folds(rows, folds)?;
     let mut labels: Vec<usize> = (0..rows).map(|row| row % folds).collect();
     labels.shuffle(&mut Stream::Folds.of(seed));
     Ok(labels)
 }
 
-/// Assigns each row to one of `folds` blocks of neighbouring rows, in their order, sizes differing by at most
+/// Assigns each row to one of `folds` blocks of neighboring rows, in their order, sizes differing by at most
 /// 1: folds for rows in the order of time.
 ///
 /// # Errors
 /// Those of [`assign_folds`].
 pub fn assign_blocks(rows: usize, folds: usize) -> Result<Vec<usize>> {
-    if folds < 2 || folds > rows {
-        return Err(Error::Parameter {
-            name: "folds",
-            value: folds as f64,
-            expected: "at least 2 and at most the number of rows",
-        });
-    }
-    check_room("the fold labels", rows, 1)?;
+    check_folds(rows, folds)?;
     Ok((0..rows)
         .map(|row| (row as u128 * folds as u128 / rows as u128) as usize)
         .collect())

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::design_svd::{DesignSvd, DesignSvdWithRows};
 use super::equilibration::EquilibratedProblem;
+use super::lambda_grid::{FIRST_STEP, distinguishable_lambdas, grid, strength};
 use super::leave_one_out::{self, NEGLIGIBLE};
 use super::normal_equations::RowSource;
 use super::tiles::{self, Tiles};
@@ -428,37 +429,6 @@ impl Ridge {
 /// decades of the strength, and the weakest of those has output weights thousands of times larger,
 /// which only cancel among the rows that the choice was made on.
 const TOLERANCE: f64 = 0.01;
-
-const STEPS_PER_DECADE: i32 = 4;
-/// Of the weakest and the strongest candidate.
-const FIRST_STEP: i32 = -31 * STEPS_PER_DECADE;
-const LAST_STEP: i32 = 2 * STEPS_PER_DECADE;
-
-fn grid(first: i32) -> impl Iterator<Item = i32> {
-    first..=LAST_STEP
-}
-
-fn strength(step: i32) -> f64 {
-    10.0_f64.powf(f64::from(step) / f64::from(STEPS_PER_DECADE))
-}
-
-/// The candidates that make a difference to this problem, rising.
-fn distinguishable_lambdas<A: Scalar>(spectrum: &DesignSvd<A>) -> Vec<f64> {
-    let smallest = match (spectrum.s.first(), spectrum.s.last()) {
-        (Some(&first), Some(&last)) => (last / first).as_f64().powi(2),
-        _ => 1.0,
-    };
-    let step = |strength: f64| {
-        let step = (strength.log10() * f64::from(STEPS_PER_DECADE)).floor();
-        (step as i32).clamp(FIRST_STEP, LAST_STEP)
-    };
-    // Below `dense` only the last per cent of the smallest direction is at stake.
-    let (first, dense) = (step(smallest * f64::EPSILON), step(smallest * 1e-2));
-    grid(first)
-        .filter(|step| *step >= dense || (dense - step) % (2 * STEPS_PER_DECADE) == 0)
-        .map(strength)
-        .collect()
-}
 
 /// The largest relative error of one rounding, half of epsilon.
 fn unit_roundoff<A: Scalar>() -> f64 {

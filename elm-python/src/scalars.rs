@@ -1,0 +1,60 @@
+//! Models and arrays of either scalar type.
+
+use elm::persist::{self, Persist};
+use ndarray::{Array2, ArrayView2};
+use numpy::{Element, IntoPyArray, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::settings::error;
+
+/// What there is for each scalar type.
+pub(crate) enum Either<S, D> {
+    F32(S),
+    F64(D),
+}
+
+/// Evaluates an expression for either type.
+macro_rules! either {
+    ($kind:expr, $model:ident => $value:expr) => {
+        match $kind {
+            $crate::scalars::Either::F32($model) => $value,
+            $crate::scalars::Either::F64($model) => $value,
+        }
+    };
+}
+pub(crate) use either;
+
+impl<S, D> Either<S, D> {
+    /// NumPy's name of the type.
+    pub(crate) fn dtype(&self) -> &'static str {
+        match self {
+            Self::F32(_) => "float32",
+            Self::F64(_) => "float64",
+        }
+    }
+}
+
+impl<S: Persist, D: Persist> Either<S, D> {
+    /// Reads a file of either type.
+    pub(crate) fn load(bytes: &[u8]) -> PyResult<Self> {
+        match persist::from_bytes::<D>(bytes) {
+            Ok(double) => Ok(Self::F64(double)),
+            Err(persist::Error::ScalarType { .. }) => persist::from_bytes::<S>(bytes)
+                .map(Self::F32)
+                .map_err(error),
+            Err(reason) => Err(error(reason)),
+        }
+    }
+}
+
+/// What `evaluate` makes of an array, the interpreter's lock released meanwhile.
+pub(crate) fn on_rows<'py, A: Element + Sync>(
+    py: Python<'py>,
+    x: &Bound<'py, PyAny>,
+    evaluate: impl FnOnce(ArrayView2<'_, A>) -> PyResult<Array2<A>> + Send,
+) -> PyResult<Bound<'py, PyAny>> {
+    let x = x.extract::<PyReadonlyArray2<'_, A>>()?;
+    let x = x.as_array();
+    let values = py.detach(|| evaluate(x))?;
+    Ok(values.into_pyarray(py).into_any())
+}

@@ -1,0 +1,38 @@
+//! The relative strengths of ridge that are tried.
+
+use super::design_svd::DesignSvd;
+use crate::scalar::Scalar;
+
+/// Steps of the grid to a decade.
+const STEPS_PER_DECADE: i32 = 4;
+/// Of the weakest and the strongest candidate.
+pub(super) const FIRST_STEP: i32 = -31 * STEPS_PER_DECADE;
+const LAST_STEP: i32 = 2 * STEPS_PER_DECADE;
+
+/// The steps from `first` to the strongest.
+pub(super) fn grid(first: i32) -> impl Iterator<Item = i32> {
+    first..=LAST_STEP
+}
+
+/// The strength of a step.
+pub(super) fn strength(step: i32) -> f64 {
+    10.0_f64.powf(f64::from(step) / f64::from(STEPS_PER_DECADE))
+}
+
+/// The candidates that make a difference to this problem, rising.
+pub(super) fn distinguishable_lambdas<A: Scalar>(spectrum: &DesignSvd<A>) -> Vec<f64> {
+    let smallest = match (spectrum.s.first(), spectrum.s.last()) {
+        (Some(&first), Some(&last)) => (last / first).as_f64().powi(2),
+        _ => 1.0,
+    };
+    let step = |strength: f64| {
+        let step = (strength.log10() * f64::from(STEPS_PER_DECADE)).floor();
+        (step as i32).clamp(FIRST_STEP, LAST_STEP)
+    };
+    // Below `dense` only the last per cent of the smallest direction is at stake.
+    let (first, dense) = (step(smallest * f64::EPSILON), step(smallest * 1e-2));
+    grid(first)
+        .filter(|step| *step >= dense || (dense - step) % (2 * STEPS_PER_DECADE) == 0)
+        .map(strength)
+        .collect()
+}
