@@ -215,20 +215,7 @@ fn parse(
     let named = channels.all(|&column| channel::is_reflectance_factor(&names[column]));
     if named {
         // Read again, they must not be divided again.
-        let mut renamed: Vec<String> = Vec::with_capacity(samples.channels.len());
-        for name in &samples.channels {
-            let name = channel::without_factor(name);
-            let same = renamed
-                .iter()
-                .filter(|other| other.starts_with(&name))
-                .count();
-            renamed.push(if same > 0 {
-                format!("{name} ({})", same + 1)
-            } else {
-                name
-            });
-        }
-        samples.channels = renamed;
+        samples.channels = without_factors(&samples.channels);
     }
     if named || choice.reflectance_factor {
         samples.values /= std::f64::consts::PI;
@@ -251,6 +238,22 @@ fn parse(
         notes.push(Note::LeftOut { columns });
     }
     Ok(Parsed { samples, notes })
+}
+
+/// Names of reflectance factors as those of values of the BRDF, each once.
+fn without_factors(channels: &[String]) -> Vec<String> {
+    let mut renamed: Vec<String> = Vec::with_capacity(channels.len());
+    for name in channels {
+        let name = channel::without_factor(name);
+        let others = renamed.iter();
+        let same = others.filter(|other| other.starts_with(&name)).count();
+        renamed.push(if same > 0 {
+            format!("{name} ({})", same + 1)
+        } else {
+            name
+        });
+    }
+    renamed
 }
 
 /// The options with the unit that the file says, and what was assumed of its text and names.

@@ -50,6 +50,7 @@
 //! ```
 
 mod counted_rows;
+mod interval;
 
 use ndarray::{Array, Array1, Array2, ArrayRef2, Axis, Ix2, Zip, s};
 
@@ -365,98 +366,6 @@ impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
         let mut deviation = spread.mapv_into(|s| (A::one() + s).sqrt()) * &self.noise;
         deviation.zip_mut_with(&self.change_outside(&x), |d, &change| *d = d.hypot(change));
         finite(deviation).map(D::of_matrix)
-    }
-
-    /// Lower and upper ends of jackknife+ intervals that cover a new observation with about this
-    /// probability: shape (rows, inputs) to two of (rows, outputs). With too few training rows
-    /// for the coverage asked for (fewer than $1 / (1 - \text{coverage}) - 1$) they are infinite;
-    /// for one below a half the lower end may lie above the upper: the interval is empty.
-    ///
-    /// Costs training rows x neurons for each row of `x`.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] unless `coverage` lies strictly between 0 and 1; those of
-    /// [`Elm::predict`].
-    pub fn predict_interval<X: Inputs<A> + ?Sized>(
-        &self,
-        x: &X,
-        coverage: f64,
-    ) -> Result<(Array<A, D>, Array<A, D>)> {
-        if !(coverage > 0.0 && coverage < 1.0) {
-            return Err(Error::Parameter {
-                name: "coverage",
-                value: coverage,
-                expected: "above 0 and below 1",
-            });
-        }
-        let x = x.as_matrix();
-        let predicted = self.model.predict_matrix(&x)?;
-        let hidden = self.members().map(|member| member.hidden_matrix(&x));
-        let hidden = hidden.collect::<Result<Vec<_>>>()?;
-        let rows = self.rows.present.len();
-        // The k-th smallest and largest of n ends, k = floor(alpha (n + 1)).
-        let outside = ((1.0 - coverage) * (rows as f64 + 1.0) + 1e-9).floor() as usize;
-        // A coverage near 0 would leave out more ends than there are.
-        let outside = outside.min(rows);
-        let mut low = Array2::from_elem(predicted.dim(), A::neg_infinity());
-        let mut high = Array2::from_elem(predicted.dim(), A::infinity());
-        if outside == 0 {
-            return Ok((D::of_matrix(low), D::of_matrix(high)));
-        }
-        let share = A::from_f64(self.members.len() as f64).recip();
-        let change = self.change_outside(&x);
-        let studentized = self.rows.groups.is_none();
-        let mut spread = Array2::ones(predicted.dim());
-        if studentized {
-            for (member, hidden) in self.members.iter().zip(&hidden) {
-                spread.scaled_add(share * self.rows.mean, &member.spread(hidden));
-            }
-        }
-        let mut ends = vec![A::zero(); rows];
-        for (output, scores) in self.scores.columns().into_iter().enumerate() {
-            for row in 0..x.nrows() {
-                // How far the prediction here moves when each row is left out, and its variance then.
-                let mut moves = Array1::zeros(scores.len());
-                let mut halves: Array1<A> = Array1::from_elem(scores.len(), spread[[row, output]]);
-                for (member, hidden) in self.members.iter().zip(&hidden) {
-                    let lambda = member.model.diagnosis().lambda[output];
-                    let here = hidden.slice(s![row..=row, ..]);
-                    let pull = member.validator.influence(&here, lambda);
-                    Zip::from(&mut moves)
-                        .and(&pull)
-                        .and(member.left_out.column(output))
-                        .for_each(|moved, &pull, &left_out| *moved += share * pull * left_out);
-                    if studentized {
-                        Zip::from(&mut halves)
-                            .and(&pull)
-                            .and(&self.rows.weights)
-                            .and(member.freedom.column(output))
-                            .for_each(|variance, &pull, &weight, &freedom| {
-                                if weight > A::zero() {
-                                    *variance += share * pull * pull / (weight * freedom);
-                                }
-                            });
-                    }
-                }
-                self.rows.pool(&mut moves);
-                halves.mapv_inplace(A::sqrt);
-                halves *= &scores;
-                let center = predicted[[row, output]];
-                let wider = A::from_f64(6.0) * change[[row, output]];
-                let mut end = |sign: A| {
-                    for (end, &counted) in ends.iter_mut().zip(&self.rows.present) {
-                        *end = sign * (center - moves[counted]) - halves[counted];
-                    }
-                    let (_, value, _) = ends.select_nth_unstable_by(outside - 1, |a, b| {
-                        a.as_f64().total_cmp(&b.as_f64())
-                    });
-                    sign * (*value - wider)
-                };
-                low[[row, output]] = end(A::one());
-                high[[row, output]] = end(-A::one());
-            }
-        }
-        Ok((D::of_matrix(low), D::of_matrix(high)))
     }
 }
 

@@ -8,6 +8,28 @@ use super::{Block, Columns, ROWS};
 use crate::features::Features;
 use elm_datasets::geometry::DirectionPair;
 
+/// The inputs of [`Features::Anisotropic`] whose grain has this azimuth, in radians.
+#[inline(always)]
+fn anisotropic<A: Real>(azimuth: f64, d: &[&[A; ROWS]; 6], x: &mut [Block<A>]) {
+    let [a, b, c, e, f, g, ..] = x else { return };
+    let (sin, cos) = (2.0 * azimuth).sin_cos();
+    let (sin, cos) = (A::from_f64(sin), A::from_f64(cos));
+    for r in 0..ROWS {
+        let [ix, iy, iz, ox, oy, oz] = d.map(|part| part[r]);
+        let s = Sum::of(d, r);
+        let root = s.across.sqrt().atan2(s.along).sqrt();
+        let (x, y) = (ix + ox, iy + oy);
+        let turned = root / s.across.max(A::min_positive_value());
+        a.0[r] = root;
+        b.0[r] = s.cos_theta_d();
+        c.0[r] = iz * oz;
+        e.0[r] = s.along;
+        let (along, aside) = (x * x - y * y, A::from_f64(2.0) * x * y);
+        f.0[r] = turned * (cos * along + sin * aside);
+        g.0[r] = turned * (cos * aside - sin * along);
+    }
+}
+
 /// Fills a block for each input of the set. The same as
 /// [`Features::compute`](crate::features::Features::compute) but for rounding.
 #[inline(always)]
@@ -63,24 +85,7 @@ pub(super) fn compute<A: Real>(set: Features, d: &[&[A; ROWS]; 6], x: &mut [Bloc
                 };
             }
         }
-        (Features::Anisotropic { .. }, [a, b, c, e, f, g, ..]) => {
-            let (sin, cos) = (2.0 * set.azimuth()).sin_cos();
-            let (sin, cos) = (A::from_f64(sin), A::from_f64(cos));
-            for r in 0..ROWS {
-                let [ix, iy, iz, ox, oy, oz] = d.map(|part| part[r]);
-                let s = Sum::of(d, r);
-                let root = s.across.sqrt().atan2(s.along).sqrt();
-                let (x, y) = (ix + ox, iy + oy);
-                let turned = root / s.across.max(A::min_positive_value());
-                a.0[r] = root;
-                b.0[r] = s.cos_theta_d();
-                c.0[r] = iz * oz;
-                e.0[r] = s.along;
-                let (along, aside) = (x * x - y * y, A::from_f64(2.0) * x * y);
-                f.0[r] = turned * (cos * along + sin * aside);
-                g.0[r] = turned * (cos * aside - sin * along);
-            }
-        }
+        (Features::Anisotropic { .. }, x) => anisotropic(set.azimuth(), d, x),
         (Features::Algebraic, [a, b, c, ..]) => {
             for r in 0..ROWS {
                 let s = Sum::of(d, r);

@@ -1,10 +1,9 @@
 //! A network of this project, packed for evaluation by columns.
 
 use crate::fit::Model;
-use elm::{Activation, NodeType};
+use elm::{Activation, Elm, NodeType};
 use elm_datasets::brdf::EvalError;
-use ndarray::Array2;
-use ndarray::ArrayViewMut2;
+use ndarray::{Array1, Array2, ArrayViewMut2};
 use pulp::Simd;
 
 use super::dense::{Dense, Fused, MAX_INPUTS, Rectified, SquaredRectified};
@@ -62,20 +61,14 @@ enum InverseTransform<A> {
     CubeRoot { ceiling: A },
 }
 
-impl<A: Real> Packed<A> {
-    /// Packs a model.
-    ///
-    /// # Errors
-    /// [`Error::Conflict`] for a network with radial neurons, direct transforms or a function of
-    /// the user's own.
-    pub fn new(model: &BrdfModel) -> Result<Self> {
+impl<A: Real> Layers<A> {
+    fn of(network: &Elm) -> Result<Self> {
         let refused = |first| {
             Err(Error::Conflict {
                 first,
                 second: "evaluation by columns",
             })
         };
-        let network = model.network();
         let (layer, beta) = (network.hidden(), network.beta());
         if layer
             .groups()
@@ -96,7 +89,7 @@ impl<A: Real> Packed<A> {
         }
 
         // The scaling of inputs, folded in.
-        let (inputs, outputs) = (network.inputs(), network.outputs());
+        let inputs = network.inputs();
         let mut weights: Array2<f64> = layer.weights().to_owned();
         let mut biases = layer.biases().to_owned();
         if let Some(scaler) = network.scaler() {
@@ -106,47 +99,59 @@ impl<A: Real> Packed<A> {
             biases -= &scaler.mean().dot(&weights);
         }
 
-        let intercept = network.intercept();
-        let output = |neuron: usize, output: usize| beta.get((neuron, output)).copied();
-        let fused = || -> Vec<Fused<A>> {
-            let triple = |first: usize| {
-                let three = |of: &dyn Fn(usize) -> Option<f64>| {
-                    [first, first + 1, first + 2].map(|number| of(number).unwrap_or(0.0))
-                };
-                let neurons = (0..layer.neurons()).map(|k| {
-                    let beta = three(&|number| output(k, number));
-                    (biases[k], weights.column(k).to_vec(), beta)
-                });
-                Fused::new(
-                    inputs,
-                    three(&|number| intercept.get(number).copied()),
-                    neurons,
-                )
-            };
-            (0..outputs).step_by(3).map(triple).collect()
-        };
         let all = |function: Activation<A>| functions.iter().all(|(_, other)| *other == function);
-        let layers = if inputs <= MAX_INPUTS && all(Activation::Relu) {
-            Layers::Rectified(fused())
-        } else if inputs <= MAX_INPUTS && all(Activation::SquaredRelu) {
-            Layers::SquaredRectified(fused())
-        } else {
-            Layers::Any {
-                hidden: Dense::new(
-                    inputs,
-                    layer.neurons(),
-                    |input, neuron| weights[[input, neuron]],
-                    |neuron| biases[neuron],
-                ),
-                functions,
-                output: Dense::new(
-                    layer.neurons(),
-                    outputs,
-                    |neuron, output| beta[[neuron, output]],
-                    |output| intercept[output],
-                ),
-            }
+        let fused = || fused(network, &weights, &biases);
+        if inputs <= MAX_INPUTS && all(Activation::Relu) {
+            return Ok(Self::Rectified(fused()));
+        }
+        if inputs <= MAX_INPUTS && all(Activation::SquaredRelu) {
+            return Ok(Self::SquaredRectified(fused()));
+        }
+        let intercept = network.intercept();
+        Ok(Self::Any {
+            hidden: Dense::new(
+                inputs,
+                layer.neurons(),
+                |input, neuron| weights[[input, neuron]],
+                |neuron| biases[neuron],
+            ),
+            functions,
+            output: Dense::new(
+                layer.neurons(),
+                network.outputs(),
+                |neuron, output| beta[[neuron, output]],
+                |output| intercept[output],
+            ),
+        })
+    }
+}
+
+/// A network with these hidden weights and biases, three outputs at a time.
+fn fused<A: Real>(network: &Elm, weights: &Array2<f64>, biases: &Array1<f64>) -> Vec<Fused<A>> {
+    let (beta, intercept) = (network.beta(), network.intercept());
+    let triple = |first: usize| {
+        let three = |of: &dyn Fn(usize) -> Option<f64>| {
+            [first, first + 1, first + 2].map(|number| of(number).unwrap_or(0.0))
         };
+        let neurons = (0..weights.ncols()).map(|neuron| {
+            let beta = three(&|output| beta.get((neuron, output)).copied());
+            (biases[neuron], weights.column(neuron).to_vec(), beta)
+        });
+        let constants = three(&|output| intercept.get(output).copied());
+        Fused::new(network.inputs(), constants, neurons)
+    };
+    (0..network.outputs()).step_by(3).map(triple).collect()
+}
+
+impl<A: Real> Packed<A> {
+    /// Packs a model.
+    ///
+    /// # Errors
+    /// [`Error::Conflict`] for a network with radial neurons, direct transforms or a function of
+    /// the user's own.
+    pub fn new(model: &BrdfModel) -> Result<Self> {
+        let network = model.network();
+        let layers = Layers::of(network)?;
         let basis = model.target_transform().basis().map(|basis| {
             let (axes, mean) = (basis.axes(), basis.mean());
             let weight = |output: usize, channel: usize| axes[[output, channel]];
@@ -158,9 +163,9 @@ impl<A: Real> Packed<A> {
         });
         Ok(Self {
             features: model.features(),
-            neurons: layer.neurons(),
+            neurons: network.hidden().neurons(),
             layers,
-            outputs,
+            outputs: network.outputs(),
             basis,
             color,
             multiply_adds: model.multiply_adds(),

@@ -92,11 +92,38 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     )
     .map_err(usage)?;
 
+    let (entries, best) = fit_all(arguments, &subject, &names, &seeds)?;
+    let scores = best.as_ref().map_or(&[][..], |best| best.2.as_slice());
+    let data = subject.data(scores);
+    if let (Some(dir), Some((_, model, scores))) = (&arguments.plot, &best) {
+        let title = format!("{}; {model}, seed {}", data.source, arguments.protocol.seed);
+        plot::write(dir, &title, &subject.shown(scores))?;
+    }
+    let comparison = Comparison::new(
+        data,
+        arguments.protocol.folds,
+        arguments.protocol.seed,
+        seeds.len(),
+        entries,
+        start.elapsed().as_secs_f64(),
+    );
+    print(&comparison.render(arguments.format)?)
+}
+
+/// A model's error, name, and scores of the first seed.
+type Best = (f64, String, Vec<MaterialScores>);
+
+/// Cross-validates by model, then by seed; the best is kept for its pictures.
+fn fit_all(
+    arguments: &Arguments,
+    subject: &Subject,
+    names: &[ModelEntry],
+    seeds: &[u64],
+) -> Result<(Vec<Entry>, Option<Best>), Failure> {
     let progress = progress("model");
     progress.set_length((names.len() * seeds.len()) as u64);
-    // By model, then by seed; the best so far is kept for its pictures.
     let mut entries = Vec::new();
-    let mut best: Option<(f64, String, Vec<MaterialScores>)> = None;
+    let mut best: Option<Best> = None;
     for (index, named) in names.iter().enumerate() {
         if named.name == registry::POOLED && matches!(subject, Subject::Samples(_)) {
             // One material has no others.
@@ -105,7 +132,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
         let mut runs = Vec::new();
         let fitting = Instant::now();
-        for &seed in &seeds {
+        for &seed in seeds {
             let model = models::select(&arguments.models, seed)?
                 .swap_remove(index)
                 .with_row_limit(seed);
@@ -126,22 +153,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         entries.push(entry);
     }
     progress.finish_and_clear();
-
-    let scores = best.as_ref().map_or(&[][..], |best| best.2.as_slice());
-    let data = subject.data(scores);
-    if let (Some(dir), Some((_, model, scores))) = (&arguments.plot, &best) {
-        let title = format!("{}; {model}, seed {}", data.source, arguments.protocol.seed);
-        plot::write(dir, &title, &subject.shown(scores))?;
-    }
-    let comparison = Comparison::new(
-        data,
-        arguments.protocol.folds,
-        arguments.protocol.seed,
-        seeds.len(),
-        entries,
-        start.elapsed().as_secs_f64(),
-    );
-    print(&comparison.render(arguments.format)?)
+    Ok((entries, best))
 }
 
 impl Subject {

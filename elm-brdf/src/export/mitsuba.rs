@@ -70,7 +70,10 @@ pub fn plugin(model: &BrdfModel, module: &str, name: &str) -> Result<String> {
     network.select(model.target_transform(), &places)?;
     let mixture = LobeMixture::of(model)?;
     let row = "its weights of the inputs or its centre, its bias, its weights in the outputs";
-    let is_grained = !model.features().is_isotropic();
+    let grained = |text: &str| match model.features().is_isotropic() {
+        true => String::new(),
+        false => text.to_owned(),
+    };
     let is_rgb = matches!(channels, Channels::Rgb);
     let replaced = [
         ("@ABOUT@", about(model)),
@@ -78,11 +81,7 @@ pub fn plugin(model: &BrdfModel, module: &str, name: &str) -> Result<String> {
         ("@NAME@", name.to_owned()),
         (
             "@GRAIN@",
-            if is_grained {
-                "The grain\ncounts from the tangent dp/du. ".to_owned()
-            } else {
-                String::new()
-            },
+            grained("The grain\ncounts from the tangent dp/du. "),
         ),
         ("@ROW@", row.to_owned()),
         (
@@ -119,14 +118,7 @@ pub fn plugin(model: &BrdfModel, module: &str, name: &str) -> Result<String> {
                 "None".to_owned()
             },
         ),
-        (
-            "@ANISOTROPIC@",
-            if is_grained {
-                " | mi.BSDFFlags.Anisotropic".to_owned()
-            } else {
-                String::new()
-            },
-        ),
+        ("@ANISOTROPIC@", grained(" | mi.BSDFFlags.Anisotropic")),
     ];
     let (locals, expressions) = formulas(&network)?;
     let mut text = TEMPLATE

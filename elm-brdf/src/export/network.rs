@@ -73,32 +73,73 @@ pub(super) struct Output {
     pub(super) linear: Vec<f32>,
 }
 
+/// Takes weights of standardised inputs to weights of the inputs as they come.
+struct Scaling<'a> {
+    model: &'a BrdfModel,
+}
+
+impl Scaling<'_> {
+    /// What standardisation takes from an input, and what it multiplies the rest by.
+    fn of(&self, input: usize) -> (f64, f64) {
+        let scaler = self.model.network().scaler();
+        scaler.map_or((0.0, 1.0), |s| (s.mean()[input], s.factor()[input]))
+    }
+
+    /// The weights of a weighted sum, and the constant that standardisation adds to it.
+    fn additive(&self, weights: &[f64]) -> (Vec<f64>, f64) {
+        let mut constant = 0.0;
+        let weights = weights.iter().enumerate();
+        let scaled = weights.map(|(input, weight)| {
+            let (mean, factor) = self.of(input);
+            let scaled = weight * factor;
+            constant -= scaled * mean;
+            scaled
+        });
+        let scaled = scaled.collect();
+        (turned(self.model.features(), scaled), constant)
+    }
+
+    /// The scales s and the center c of a distance |s (x - mean) factor - c|.
+    fn radial(&self, scales: &[f64], center: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let both = scales.iter().zip(center).enumerate();
+        both.map(|(input, (scale, center))| {
+            let (mean, factor) = self.of(input);
+            let scale = scale * factor;
+            (scale, center + scale * mean)
+        })
+        .unzip()
+    }
+}
+
+/// What outputs add up of the inputs themselves.
+struct Linear {
+    constants: Vec<f64>,
+    weights: Vec<Vec<f64>>,
+}
+
+impl Linear {
+    /// Adds a neuron without an activation.
+    fn add(&mut self, weights: &[f64], bias: f64, betas: &[f64]) {
+        for (output, &beta) in betas.iter().enumerate() {
+            self.constants[output] += beta * bias;
+            for (sum, weight) in self.weights[output].iter_mut().zip(weights) {
+                *sum += beta * weight;
+            }
+        }
+    }
+}
+
 impl Network {
     pub(super) fn new(model: &BrdfModel) -> Result<Self, ExportError> {
         let network = model.network();
         let hidden = network.hidden();
         let (inputs, outputs) = (network.inputs(), network.outputs());
         let (beta, intercept) = (network.beta(), network.intercept());
-        // What standardisation does to an input: (x - mean) factor.
-        let scale = |input: usize| network.scaler().map_or(1.0, |s| s.factor()[input]);
-        let mean = |input: usize| network.scaler().map_or(0.0, |s| s.mean()[input]);
-        // Weights of the inputs as they come, and the constant that standardisation adds.
-        let fold = |weights: &[f64]| -> (Vec<f64>, f64) {
-            let scaled: Vec<f64> = (0..inputs).map(|i| weights[i] * scale(i)).collect();
-            let constant = (0..inputs).map(|i| -scaled[i] * mean(i)).sum();
-            (turned(model.features(), scaled), constant)
-        };
-
+        let scaling = Scaling { model };
         let mut neurons = Vec::new();
-        let mut constants: Vec<f64> = intercept.to_vec();
-        let mut linear = vec![vec![0.0; inputs]; outputs];
-        let mut add_linear = |weights: &[f64], bias: f64, betas: &[f64]| {
-            for (output, &beta) in betas.iter().enumerate() {
-                constants[output] += beta * bias;
-                for (sum, weight) in linear[output].iter_mut().zip(weights) {
-                    *sum += beta * weight;
-                }
-            }
+        let mut linear = Linear {
+            constants: intercept.to_vec(),
+            weights: vec![vec![0.0; inputs]; outputs],
         };
         let of_group = hidden.groups().iter();
         let of_group = of_group.flat_map(|group| std::iter::repeat_n(group, group.neurons()));
@@ -107,22 +148,20 @@ impl Network {
             let betas = beta.row(neuron).to_vec();
             let own = hidden.weights().column(neuron).to_vec();
             if let Some(scales) = group.input_scales() {
-                // |s (x - mean) factor - c| with the center taken to the inputs as they come.
-                let weights: Vec<f64> = (0..inputs).map(|i| scales[i] * scale(i)).collect();
-                let center = (0..inputs).map(|i| own[i] + weights[i] * mean(i));
+                let (weights, center) = scaling.radial(&scales.to_vec(), &own);
                 neurons.push(Neuron {
                     activation: activation.to_owned(),
-                    center: Some(singles("a center", &center.collect::<Vec<_>>())?),
+                    center: Some(singles("a center", &center)?),
                     weights: singles("a scale", &weights)?,
                     bias: 0.0,
                     beta: singles("an output weight", &betas)?,
                 });
                 continue;
             }
-            let (weights, constant) = fold(&own);
+            let (weights, constant) = scaling.additive(&own);
             let bias = hidden.biases()[neuron] + constant;
             if activation == "linear" {
-                add_linear(&weights, bias, &betas);
+                linear.add(&weights, bias, &betas);
                 continue;
             }
             neurons.push(Neuron {
@@ -137,17 +176,14 @@ impl Network {
         for input in 0..beta.nrows() - hidden.neurons() {
             let mut own = vec![0.0; inputs];
             own[input] = 1.0;
-            let (weights, constant) = fold(&own);
-            add_linear(
-                &weights,
-                constant,
-                &beta.row(hidden.neurons() + input).to_vec(),
-            );
+            let (weights, constant) = scaling.additive(&own);
+            let betas = beta.row(hidden.neurons() + input).to_vec();
+            linear.add(&weights, constant, &betas);
         }
         let order = |neuron: &Neuron| (neuron.activation.clone(), neuron.center.is_some());
         neurons.sort_by_key(order);
 
-        let outputs = constants.into_iter().zip(linear);
+        let outputs = linear.constants.into_iter().zip(linear.weights);
         Ok(Self {
             values: values(model)?,
             inputs: model.features().inputs().to_vec(),

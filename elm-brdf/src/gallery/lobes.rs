@@ -6,6 +6,7 @@ use std::fmt::Write;
 use crate::error::Result;
 use elm_datasets::Brdf;
 use elm_datasets::geometry::{DirectionPair, cartesian};
+use ndarray::ArrayView1;
 
 /// Angles of the light in degrees, with the colour of each lobe.
 const LIGHTS: [(f64, &str); 3] = [(10.0, "#7fb4d8"), (40.0, "#e6a857"), (70.0, "#d97a7a")];
@@ -19,27 +20,7 @@ pub(super) fn draw(brdf: &dyn Brdf) -> Result<String> {
     let degrees: Vec<f64> = (-178..=178).map(|half| f64::from(half) / 2.0).collect();
     let mut lobes = Vec::new();
     for (light, color) in LIGHTS {
-        let pairs: Vec<DirectionPair> = degrees
-            .iter()
-            .map(|viewer| DirectionPair {
-                incident: cartesian(light.to_radians(), PI),
-                outgoing: cartesian(
-                    viewer.abs().to_radians(),
-                    if *viewer < 0.0 { PI } else { 0.0 },
-                ),
-            })
-            .collect();
-        let values: Vec<f64> = brdf
-            .eval(&pairs)?
-            .rows()
-            .into_iter()
-            .map(|row| match row.len() {
-                3 => 0.2126 * row[0] + 0.7152 * row[1] + 0.0722 * row[2],
-                _ => row[0],
-            })
-            .map(|value| value.max(0.0))
-            .collect();
-        lobes.push((light, color, values));
+        lobes.push((light, color, luminances(brdf, light, &degrees)?));
     }
     let most = lobes
         .iter()
@@ -95,4 +76,23 @@ pub(super) fn draw(brdf: &dyn Brdf) -> Result<String> {
     }
     svg.push_str("</svg>");
     Ok(svg)
+}
+
+/// The luminance that each viewer sees, both in degrees; negative ones are on the side of the light.
+fn luminances(brdf: &dyn Brdf, light: f64, viewers: &[f64]) -> Result<Vec<f64>> {
+    let pair = |viewer: &f64| DirectionPair {
+        incident: cartesian(light.to_radians(), PI),
+        outgoing: cartesian(
+            viewer.abs().to_radians(),
+            if *viewer < 0.0 { PI } else { 0.0 },
+        ),
+    };
+    let pairs: Vec<DirectionPair> = viewers.iter().map(pair).collect();
+    let values = brdf.eval(&pairs)?;
+    let luminance = |row: ArrayView1<'_, f64>| match row.len() {
+        3 => 0.2126 * row[0] + 0.7152 * row[1] + 0.0722 * row[2],
+        _ => row[0],
+    };
+    let luminances = values.rows().into_iter().map(luminance);
+    Ok(luminances.map(|value| value.max(0.0)).collect())
 }

@@ -346,6 +346,12 @@ fn summary(out: &mut String, report: &Report, style: Style, compared: bool) {
             summary.mean_held_out_rmse_unsaturated
         ),
     );
+    legend(out, report, style, compared);
+}
+
+/// What the columns mean, and the times.
+fn legend(out: &mut String, report: &Report, style: Style, compared: bool) {
+    let item = if style == Style::Markdown { "- " } else { "" };
     let [relative, log_cosine, cube_root] =
         [Measure::RelativeRmse, Measure::LogCosine, Measure::CubeRoot].map(Measure::title);
     push(
@@ -354,7 +360,7 @@ fn summary(out: &mut String, report: &Report, style: Style, compared: bool) {
             "{item}'relative': {relative}; 'log-cosine': {log_cosine}; 'cube root': {cube_root}.\n"
         ),
     );
-    if compared && data.channels == ["average"] {
+    if compared && report.data.channels == ["average"] {
         push(
             out,
             format_args!(

@@ -209,11 +209,62 @@ fn find_directions(
     })
 }
 
+/// The columns of the four angles, and that of the difference of azimuths.
+type Places = ([Option<usize>; 4], Option<usize>);
+
 fn find_angles(
     names: &[String],
     named: &[Option<Named>],
     choice: &Columns,
 ) -> Result<Found, Problem> {
+    let (places, difference) = places_of_angles(names, named)?;
+    let mut angles = [Angle::Constant(0.0); 4];
+    let (mut missing, mut no_azimuth) = (Vec::new(), Vec::new());
+    for place in 0..4 {
+        let angle = ANGLES[place];
+        match (places[place], choice.angles[place]) {
+            (Some(column), Some(_)) => {
+                return Err(Problem::AngleTwice {
+                    angle,
+                    column: shorten(&names[column]),
+                });
+            }
+            (Some(column), None) => angles[place] = Angle::Column(column),
+            (None, Some(constant)) => angles[place] = Angle::Constant(constant),
+            (None, None) if place % 2 == 0 => missing.push(angle),
+            (None, None) => no_azimuth.push(place),
+        }
+    }
+    if !missing.is_empty() {
+        return Err(Problem::NoDirections { missing });
+    }
+    let mut notes = Vec::new();
+    notes.extend(other_names(names, &places));
+    match difference {
+        Some(column) if no_azimuth == [1, 3] => {
+            angles[3] = Angle::Column(column);
+            notes.push(Note::Difference {
+                column: shorten(&names[column]),
+            });
+        }
+        _ if !no_azimuth.is_empty() => {
+            let absent = no_azimuth.iter().map(|&place| ANGLES[place].to_owned());
+            let absent: Vec<String> = absent.collect();
+            notes.push(Note::NoAzimuth {
+                angles: List::of(&absent),
+            });
+        }
+        _ => {}
+    }
+    Ok(Found {
+        directions: Directions::Angles(angles),
+        unit: one_unit(&angles, named)?,
+        notes,
+    })
+}
+
+/// Finds the column of each angle by its name; none may have two.
+fn places_of_angles(names: &[String], named: &[Option<Named>]) -> Result<Places, Problem> {
     let of = |side: Side| {
         let is = move |named: &Named| matches!(named.0, Direction::Theta(other) | Direction::Phi(other) if other == side);
         named.iter().flatten().any(is)
@@ -253,67 +304,29 @@ fn find_angles(
             });
         }
     }
-    let mut angles = [Angle::Constant(0.0); 4];
-    let (mut missing, mut no_azimuth) = (Vec::new(), Vec::new());
-    let mut notes = Vec::new();
-    for place in 0..4 {
-        let angle = ANGLES[place];
-        angles[place] = match (places[place], choice.angles[place]) {
-            (Some(column), Some(_)) => {
-                return Err(Problem::AngleTwice {
-                    angle,
-                    column: shorten(&names[column]),
-                });
-            }
-            (Some(column), None) => Angle::Column(column),
-            (None, Some(constant)) => Angle::Constant(constant),
-            (None, None) if place % 2 == 0 => {
-                missing.push(angle);
-                continue;
-            }
-            (None, None) => {
-                no_azimuth.push(place);
-                continue;
-            }
-        };
-    }
-    if !missing.is_empty() {
-        return Err(Problem::NoDirections { missing });
-    }
+    Ok((places, difference))
+}
+
+/// A note of the columns that were taken for an angle under another name.
+fn other_names(names: &[String], places: &[Option<usize>; 4]) -> Option<Note> {
     let mut others: Vec<String> = Vec::new();
-    for (place, column) in places.iter().enumerate() {
+    for (column, canonical) in places.iter().zip(ANGLES) {
         let Some(column) = *column else { continue };
-        let canonical = ANGLES[place];
         if !names[column].trim().eq_ignore_ascii_case(canonical) {
             others.push(format!("{} as {canonical}", shorten(&names[column])));
         }
     }
-    if !others.is_empty() {
-        notes.push(Note::Names {
-            columns: List::of(&others),
-        });
-    }
-    match difference {
-        Some(column) if no_azimuth == [1, 3] => {
-            angles[3] = Angle::Column(column);
-            notes.push(Note::Difference {
-                column: shorten(&names[column]),
-            });
-        }
-        _ if !no_azimuth.is_empty() => {
-            let absent = no_azimuth.iter().map(|&place| ANGLES[place].to_owned());
-            let absent: Vec<String> = absent.collect();
-            notes.push(Note::NoAzimuth {
-                angles: List::of(&absent),
-            });
-        }
-        _ => {}
-    }
-    let used = angles.iter().filter_map(|angle| match angle {
+    let columns = List::of(&others);
+    (!others.is_empty()).then_some(Note::Names { columns })
+}
+
+/// The unit that the names of the angles say, which must be the same.
+fn one_unit(angles: &[Angle; 4], named: &[Option<Named>]) -> Result<Option<AngleUnit>, Problem> {
+    let said = angles.iter().filter_map(|angle| match angle {
         Angle::Column(column) => named[*column].and_then(|(_, unit)| unit),
         Angle::Constant(_) => None,
     });
-    let units: Vec<AngleUnit> = used.collect();
+    let units: Vec<AngleUnit> = said.collect();
     let unit = units.first().copied();
     if units.iter().any(|&other| Some(other) != unit) {
         return Err(Problem::Units {
@@ -321,11 +334,7 @@ fn find_angles(
             advice: "all angles must be in one unit",
         });
     }
-    Ok(Found {
-        directions: Directions::Angles(angles),
-        unit,
-        notes,
-    })
+    Ok(unit)
 }
 
 fn all<const N: usize>(places: [Option<usize>; N]) -> Option<[usize; N]> {

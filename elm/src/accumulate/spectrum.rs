@@ -1,5 +1,7 @@
 //! Converts an accumulator's triangle into the problem that a batch fit would have prepared.
 
+use std::ops::Range;
+
 use ndarray::{Array1, ArrayView1, Axis, s};
 
 use super::Accumulator;
@@ -15,7 +17,7 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
     pub(super) fn spectrum(&self) -> Result<DesignSvd<A>> {
         let extra = usize::from(self.intercept);
         let neurons = self.columns() - self.outputs - extra;
-        let (hidden, targets) = (extra..extra + neurons, extra + neurons..);
+        let (hidden, targets) = (extra..extra + neurons, extra + neurons..self.columns());
         let rows = usize::try_from(self.rows).unwrap_or(usize::MAX);
 
         // Neurons share one scale, so that the singular values are those of the whole matrix.
@@ -23,46 +25,27 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
         let mut hidden_scale = scales
             .iter()
             .fold(A::min_positive_value(), |m, s| m.max(*s));
-        let mut h = self
-            .triangle
-            .slice(s![hidden.clone(), hidden.clone()])
-            .to_owned();
+        let block = |rows: &Range<usize>, columns: &Range<usize>| {
+            let block = s![rows.clone(), columns.clone()];
+            self.triangle.slice(block).to_owned()
+        };
+        let mut h = block(&hidden, &hidden);
         h *= &(&scales / hidden_scale);
         let mut target_scale = self.scales.slice(s![targets.clone()]).to_owned();
-        let mut t = self
-            .triangle
-            .slice(s![hidden.clone(), targets.clone()])
-            .to_owned();
-        let mut rest = self
-            .triangle
-            .slice(s![targets.clone(), targets.clone()])
-            .to_owned();
+        let mut t = block(&hidden, &targets);
+        let mut rest = block(&targets, &targets);
         let (mut hidden_mean, mut target_mean) =
             (Array1::zeros(neurons), Array1::zeros(self.outputs));
         if self.intercept {
-            let first = self.triangle.row(0);
-            let relative = |column: usize| self.scales[column] / self.scales[0] / first[0];
-            let mean = |column: usize| {
-                let shift = self.shift.as_ref().map_or(A::zero(), |s| s[column - 1]);
-                shift + first[column] * relative(column)
-            };
-            // What centering leaves of a constant is the rounding of its values, and would pass for a
-            // feature; it does not grow with the rows.
-            let bound = A::from_f64(4.0) * A::epsilon();
-            let is_constant = |column: usize| {
-                let left = self.triangle.slice(s![1..=column, column]);
-                let deviation = left.dot(&left).sqrt() * relative(column).abs();
-                deviation <= bound * mean(column).abs()
-            };
-            hidden_mean = hidden.clone().map(mean).collect();
-            target_mean = (extra + neurons..self.columns()).map(mean).collect();
-            for (column, place) in hidden.clone().enumerate() {
-                if is_constant(place) {
+            hidden_mean = hidden.clone().map(|place| self.mean(place)).collect();
+            target_mean = targets.clone().map(|place| self.mean(place)).collect();
+            for (column, place) in hidden.enumerate() {
+                if self.is_constant(place) {
                     h.column_mut(column).fill(A::zero());
                 }
             }
-            for (output, place) in (extra + neurons..self.columns()).enumerate() {
-                if is_constant(place) {
+            for (output, place) in targets.enumerate() {
+                if self.is_constant(place) {
                     t.column_mut(output).fill(A::zero());
                     rest.column_mut(output).fill(A::zero());
                 }
@@ -106,5 +89,24 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
             residual_ss: rest.map_axis(Axis(0), |column| column.dot(&column)),
         };
         DesignSvd::of_triangle(triangle, frame)
+    }
+
+    /// From an entry of the triangle's column, over the first row's diagonal, to a value of that column.
+    fn unscaled(&self, column: usize) -> A {
+        self.scales[column] / self.scales[0] / self.triangle[[0, 0]]
+    }
+
+    /// The mean of a column; for sums with an intercept.
+    fn mean(&self, column: usize) -> A {
+        let shift = self.shift.as_ref().map_or(A::zero(), |s| s[column - 1]);
+        shift + self.triangle[[0, column]] * self.unscaled(column)
+    }
+
+    /// Whether a column is a constant. What centering leaves of one is the rounding of its values, and would
+    /// pass for a feature; it does not grow with the rows.
+    fn is_constant(&self, column: usize) -> bool {
+        let left = self.triangle.slice(s![1..=column, column]);
+        let deviation = left.dot(&left).sqrt() * self.unscaled(column).abs();
+        deviation <= A::from_f64(4.0) * A::epsilon() * self.mean(column).abs()
     }
 }

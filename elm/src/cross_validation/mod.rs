@@ -51,7 +51,8 @@ pub use crate::dataset::{assign_blocks, assign_folds};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 use crate::solve::design_svd::{DesignSvd, DesignSvdWithRows};
-use crate::solve::ridge::ridge_solution;
+use crate::solve::lambda_grid::coarse_grid;
+use crate::solve::ridge::{TOLERANCE, ridge_solution};
 use crate::solve::{Lambda, LeastSquares, Reason, Ridge, Solution, in_range};
 use fold::Fold;
 pub(crate) use fold::check_several;
@@ -322,9 +323,9 @@ impl<A: Scalar> CrossValidator<A> {
         if ridge.lambda() != Lambda::LeaveOneOut {
             return self.select_lambda(ridge);
         }
-        let candidates = Ridge::coarse_grid(self.rows.spectrum.condition());
+        let candidates = coarse_grid(self.rows.spectrum.condition());
         let path = self.k_fold_path(folds, &candidates)?;
-        Ok(path.strongest(ridge.shared(), Ridge::HALF_TOLERANCE))
+        Ok(path.strongest(ridge.shared(), TOLERANCE / 2.0))
     }
 
     /// The leave-one-out error of each output along a path of relative strengths.

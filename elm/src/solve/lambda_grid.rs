@@ -36,3 +36,14 @@ pub(super) fn distinguishable_lambdas<A: Scalar>(spectrum: &DesignSvd<A>) -> Vec
         .map(strength)
         .collect()
 }
+
+/// Strengths, two to a decade, down to where the smallest direction of a matrix of this condition is no
+/// longer held back.
+pub(crate) fn coarse_grid(condition: f64) -> Vec<f64> {
+    let least = (condition.powi(-2) * 1e-2).max(1e-12);
+    grid(FIRST_STEP)
+        .filter(|step| step % 2 == 0)
+        .map(strength)
+        .filter(|strength| *strength >= least)
+        .collect()
+}

@@ -30,7 +30,7 @@ mod diagnosis;
 pub(crate) mod equilibration;
 mod gram;
 mod inverse;
-mod lambda_grid;
+pub(crate) mod lambda_grid;
 pub(crate) mod lanczos;
 mod leave_one_out;
 #[cfg(feature = "serde")]

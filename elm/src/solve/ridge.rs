@@ -125,20 +125,6 @@ impl Ridge {
         self.shared
     }
 
-    /// What errors may exceed the smallest by for a stronger ridge, as [`TOLERANCE`] of their squares.
-    pub(crate) const HALF_TOLERANCE: f64 = TOLERANCE / 2.0;
-
-    /// Strengths, two to a decade, down to where the smallest direction of a matrix of this condition is no
-    /// longer held back.
-    pub(crate) fn coarse_grid(condition: f64) -> Vec<f64> {
-        let least = (condition.powi(-2) * 1e-2).max(1e-12);
-        grid(FIRST_STEP)
-            .filter(|step| step % 2 == 0)
-            .map(strength)
-            .filter(|strength| *strength >= least)
-            .collect()
-    }
-
     /// The strengths that may be chosen, rising: four to a decade from [`Ridge::FLOOR`] to 100.
     ///
     /// Of those a search leaves out the many that are one fit: all that hold back less than
@@ -428,7 +414,7 @@ impl Ridge {
 /// RMSE, which some thousands of rows do not tell from chance. Scores are often as flat over many
 /// decades of the strength, and the weakest of those has output weights thousands of times larger,
 /// which only cancel among the rows that the choice was made on.
-const TOLERANCE: f64 = 0.01;
+pub(crate) const TOLERANCE: f64 = 0.01;
 
 /// The largest relative error of one rounding, half of epsilon.
 fn unit_roundoff<A: Scalar>() -> f64 {

@@ -90,6 +90,31 @@ impl Front {
             (0.1, 1.0)
         }
     }
+
+    /// What the front leaves possible: steps from the largest error to the largest time.
+    fn steps(&self, most_time: f64, most_error: f64) -> Vec<(f64, f64)> {
+        let mut steps = Vec::new();
+        let mut before = most_error;
+        for (time, error, _) in &self.front {
+            steps.extend([(*time, before), (*time, *error)]);
+            before = *error;
+        }
+        if !steps.is_empty() {
+            steps.push((most_time, before));
+        }
+        steps
+    }
+}
+
+/// Three digits, as few as that takes.
+fn number(value: &f64) -> String {
+    let places = (2.0 - value.log10().floor()).max(0.0) as usize;
+    let text = format!("{value:.places$}");
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
 }
 
 impl Chart for Front {
@@ -110,18 +135,6 @@ impl Chart for Front {
                 (times.0..times.1).log_scale(),
                 (errors.0..errors.1).log_scale(),
             )?;
-        let number = |value: &f64| {
-            // Three digits, as few as that takes.
-            let text = format!(
-                "{value:.*}",
-                (2.0 - value.log10().floor()).max(0.0) as usize
-            );
-            if text.contains('.') {
-                text.trim_end_matches('0').trim_end_matches('.').to_owned()
-            } else {
-                text
-            }
-        };
         chart
             .configure_mesh()
             .light_line_style(TRANSPARENT)
@@ -133,17 +146,11 @@ impl Chart for Front {
             .label_style(("sans-serif", 13))
             .axis_desc_style(("sans-serif", 15))
             .draw()?;
-        // What the front leaves possible ends in steps.
-        let mut steps = Vec::new();
-        for (index, (time, error, _)) in self.front.iter().enumerate() {
-            let before = index.checked_sub(1).map_or(errors.1, |k| self.front[k].1);
-            steps.extend([(*time, before), (*time, *error)]);
-        }
-        if let Some((_, error, _)) = self.front.last() {
-            steps.push((times.1, *error));
-        }
         chart
-            .draw_series(LineSeries::new(steps, GRAY.stroke_width(2)))?
+            .draw_series(LineSeries::new(
+                self.steps(times.1, errors.1),
+                GRAY.stroke_width(2),
+            ))?
             .label("Pareto front")
             .legend(|(x, y)| PathElement::new([(x, y), (x + 24, y)], GRAY.stroke_width(2)));
         for kind in [Kind::Other, Kind::Network, Kind::Published] {
