@@ -12,7 +12,7 @@ use crate::scalar::Scalar;
 pub use arrays::{Inputs, TargetDim, Targets};
 pub(crate) use arrays::{check_outputs, matrix, per_output};
 pub use folds::{assign_blocks, assign_folds};
-pub(crate) use rows::Rows;
+pub(crate) use rows::{RepeatedRows, Rows, counts};
 
 /// Training data: inputs and targets, and where wanted a weight and a group for each row. Borrowed, and
 /// checked once, however many fits are made of it.

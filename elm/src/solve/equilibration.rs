@@ -3,6 +3,7 @@
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip};
 
 use super::LeastSquares;
+use crate::dataset::counts;
 use crate::scalar::{Scalar, power_of_two};
 use crate::stats;
 
@@ -27,20 +28,11 @@ pub(crate) struct Equilibration<A: Scalar> {
 }
 
 impl<A: Scalar> Equilibration<A> {
-    /// How many rows each stands for, where weights can be such counts: whole multiples, of at most 20, of
-    /// the smallest. (Weights that undo different noise are far apart, or no multiples.) 1 for a row that
-    /// does not count.
+    /// How many rows each stands for, where weights can be such [counts]; 1 for a row that does not count.
     pub(crate) fn counts(&self) -> Option<Array1<A>> {
-        const MOST: f64 = 20.0;
-        let present = self.root_weights.iter().filter(|root| **root > A::zero());
-        let least = present.fold(1.0, |m: f64, root| m.min(root.as_f64().powi(2)));
-        let count = |root: &A| {
-            let count = root.as_f64().powi(2) / least;
-            let whole = count.round().max(1.0);
-            let close = *root == A::zero() || (count / whole - 1.0).abs() < 1e-6;
-            (close && whole <= MOST).then(|| A::from_f64(whole))
-        };
-        self.root_weights.iter().map(count).collect()
+        let roots = self.root_weights.iter();
+        let counts = counts(roots.map(|root| root.as_f64().powi(2)))?.into_iter();
+        Some(counts.map(|count| A::from_f64(count.max(1.0))).collect())
     }
 
     /// Whether some rows that count weigh more than others.

@@ -61,7 +61,7 @@ use ndarray::Ix2;
 use serde::{Deserialize, Serialize};
 
 use crate::activation::Activation;
-use crate::dataset::{Dataset, Inputs, Rows, TargetDim, Targets};
+use crate::dataset::{Dataset, Inputs, RepeatedRows, Rows, TargetDim, Targets};
 use crate::error::{Error, Result};
 use crate::feature_map::Biases;
 use crate::model::ElmParams;
@@ -321,14 +321,22 @@ impl<A: Scalar> Tuner<A> {
     /// Searches, and fits the best setting to all rows. Whatever solver was set, ridge by leave-one-out
     /// is used.
     ///
-    /// Weights of rows count in errors as they do in fits. Rows of one group are held out together, by
-    /// both [criteria](Criterion).
+    /// Weights of rows count in errors as they do in fits; a row of weight 2 is two rows where all are whole
+    /// multiples, of at most 20, of the smallest, and the search looks at all of these. Rows of one group are
+    /// held out together, by both [criteria](Criterion).
     ///
     /// # Errors
     /// [`Error::Parameter`] for a setting out of range, and those of [`ElmParams::fit_dataset`].
     #[doc(alias = "GridSearchCV")]
     pub fn tune<D: TargetDim>(&self, data: &Dataset<'_, A, D>) -> Result<Tuned<A, D>> {
         self.check()?;
+        match RepeatedRows::new(data, self.search_rows) {
+            Some(rows) => self.tune_rows(&rows.data()),
+            None => self.tune_rows(data),
+        }
+    }
+
+    fn tune_rows<D: TargetDim>(&self, data: &Dataset<'_, A, D>) -> Result<Tuned<A, D>> {
         if let Some(choice) = self.full_search(data)? {
             return Ok(Tuned {
                 model: choice.params.fit_dataset(data)?,

@@ -1,5 +1,6 @@
 //! Choices where rows are not alike: they differ in noise, are copies of each other, or follow in time.
 
+use elm::classify::LabeledRows;
 use elm::cross_validation::{assign_blocks, assign_folds};
 use elm::solve::Ridge;
 use elm::tune::Criterion;
@@ -292,4 +293,81 @@ fn folds_as_labels_are_groups() {
         .tune(&data.with_groups(&groups).unwrap())
         .unwrap();
     assert!(one.best.score < 0.5 * other.best.score);
+}
+
+/// Rows with weights 0 to 4 in one order, and with the rows repeated in another.
+fn counted_in_another_order() -> [(Array2<f64>, Vec<usize>, Array1<f64>); 2] {
+    let x = normal::<f64>(60, 3, 11);
+    let noise = normal::<f64>(60, 1, 12);
+    let class = |i: usize| usize::from(x[[i, 0]] + x[[i, 1]] * x[[i, 2]] + noise[[i, 0]] > 0.0);
+    let labels: Vec<usize> = (0..60).map(class).collect();
+    let counts: Vec<usize> = (0..60).map(|i| (7 * i + i * i) % 5).collect();
+    let rows = |i: usize| std::iter::repeat_n(i, counts[i]);
+    let repeated: Vec<usize> = (0..60).flat_map(rows).collect();
+    let turned: Vec<usize> = (0..60).map(|i| (37 * i) % 60).collect();
+    let of = |rows: &[usize]| rows.iter().map(|&row| labels[row]).collect();
+    let weights = turned.iter().map(|&row| counts[row] as f64).collect();
+    [
+        (x.select(Axis(0), &turned), of(&turned), weights),
+        (
+            x.select(Axis(0), &repeated),
+            of(&repeated),
+            Array1::ones(repeated.len()),
+        ),
+    ]
+}
+
+#[test]
+fn whole_weights_are_numbers_of_rows_in_searches_and_classifiers_whatever_the_order() {
+    let [(x, labels, weights), (twice_x, twice_labels, _)] = counted_in_another_order();
+    let other = normal::<f64>(50, 3, 13);
+    let close = |what: &str, a: Array2<f64>, b: Array2<f64>| {
+        let most = a.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let largest = (a - b).iter().fold(0.0_f64, |m, d| m.max(d.abs()));
+        assert!(largest <= 1e-7 * most, "{what}: {largest}");
+    };
+    let target = |labels: &[usize]| -> Array2<f64> {
+        let column: Array1<f64> = labels.iter().map(|&label| label as f64).collect();
+        column.insert_axis(Axis(1))
+    };
+    let (t, twice_t) = (target(&labels), target(&twice_labels));
+    let data = Dataset::new(&x, &t).unwrap();
+    let data = data.with_weights(&weights).unwrap();
+    for (what, tuner) in [
+        ("quick", ElmParams::auto()),
+        ("full", ElmParams::auto().full()),
+    ] {
+        let weighted = tuner.tune(&data).unwrap().model;
+        let repeated = tuner.fit(&twice_x, &twice_t).unwrap();
+        close(
+            what,
+            weighted.predict(&other).unwrap(),
+            repeated.predict(&other).unwrap(),
+        );
+    }
+    let rows = LabeledRows::new(&x, &labels).unwrap();
+    let rows = rows.with_weights(&weights).unwrap();
+    let params = ElmParams::new(50);
+    close(
+        "a classifier",
+        params
+            .fit_labeled(&rows)
+            .unwrap()
+            .predict_proba(&other)
+            .unwrap(),
+        params
+            .fit_classifier(&twice_x, &twice_labels)
+            .unwrap()
+            .predict_proba(&other)
+            .unwrap(),
+    );
+    let weighted = ElmParams::auto().tune_classifier(&rows).unwrap().classifier;
+    let repeated = ElmParams::auto()
+        .fit_classifier(&twice_x, &twice_labels)
+        .unwrap();
+    close(
+        "a search for a classifier",
+        weighted.predict_proba(&other).unwrap(),
+        repeated.predict_proba(&other).unwrap(),
+    );
 }
