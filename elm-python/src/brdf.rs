@@ -1,9 +1,13 @@
 //! Reflectance models.
 
+use std::sync::OnceLock;
+
 use elm_brdf::model::{BrdfModel, Tuned};
 use elm_datasets::Brdf as _;
-use elm_datasets::geometry::DirectionPair;
-use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
+use elm_datasets::geometry::{DirectionPair, Vector};
+use elm_datasets::mixture::LobeMixture;
+use ndarray::{Array1, Array2, ArrayView1};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -13,6 +17,32 @@ use crate::settings::error;
 #[pyclass(frozen, module = "elm_learn._elm_learn")]
 pub(crate) struct Brdf {
     model: BrdfModel,
+    /// Fitted when it is first needed.
+    mixture: OnceLock<LobeMixture>,
+}
+
+impl Brdf {
+    fn of(model: BrdfModel) -> Self {
+        let mixture = OnceLock::new();
+        Self { model, mixture }
+    }
+
+    fn mixture(&self) -> PyResult<&LobeMixture> {
+        if let Some(mixture) = self.mixture.get() {
+            return Ok(mixture);
+        }
+        let fitted = LobeMixture::of(&self.model).map_err(error)?;
+        Ok(self.mixture.get_or_init(|| fitted))
+    }
+}
+
+fn is_above(w: Vector) -> bool {
+    w[2] > 0.0
+}
+
+fn unit(v: ArrayView1<'_, f64>) -> Vector {
+    let length = v.dot(&v).sqrt();
+    [v[0] / length, v[1] / length, v[2] / length]
 }
 
 /// Pairs of unit vectors, shape (pairs, 3) each.
@@ -28,10 +58,6 @@ fn pairs(
             wo.shape()
         )));
     }
-    let unit = |v: ndarray::ArrayView1<'_, f64>| -> [f64; 3] {
-        let length = v.dot(&v).sqrt();
-        [v[0] / length, v[1] / length, v[2] / length]
-    };
     let rows = wi.rows().into_iter().zip(wo.rows());
     Ok(rows
         .map(|(wi, wo)| DirectionPair {
@@ -45,8 +71,9 @@ fn pairs(
 impl Brdf {
     #[staticmethod]
     fn load(py: Python<'_>, path: std::path::PathBuf) -> PyResult<Self> {
-        let model = py.detach(|| BrdfModel::load(path)).map_err(error)?;
-        Ok(Self { model })
+        py.detach(|| BrdfModel::load(path))
+            .map(Self::of)
+            .map_err(error)
     }
 
     #[staticmethod]
@@ -64,10 +91,9 @@ impl Brdf {
             neurons,
             ..Tuned::default()
         };
-        let model = py
-            .detach(|| tuned.fit_model(&pairs, values))
-            .map_err(error)?;
-        Ok(Self { model })
+        py.detach(|| tuned.fit_model(&pairs, values))
+            .map(Self::of)
+            .map_err(error)
     }
 
     /// BRDF in 1/sr, shape (pairs, channels).
@@ -80,6 +106,57 @@ impl Brdf {
         let pairs = pairs(&wi, &wo)?;
         let values = py.detach(|| self.model.eval(&pairs)).map_err(error)?;
         Ok(values.into_pyarray(py))
+    }
+
+    /// Directions towards the light and their densities, for viewers (n, 3) and uniform numbers (n, 2).
+    fn sample<'py>(
+        &self,
+        py: Python<'py>,
+        wo: PyReadonlyArray2<'_, f64>,
+        u: PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)> {
+        let (wo, u) = (wo.as_array(), u.as_array());
+        if wo.ncols() != 3 || u.dim() != (wo.nrows(), 2) {
+            return Err(PyValueError::new_err(format!(
+                "wo must have shape (n, 3) and u (n, 2), found {:?} and {:?}",
+                wo.shape(),
+                u.shape()
+            )));
+        }
+        let (directions, densities) = py.detach(|| -> PyResult<_> {
+            let mixture = self.mixture()?;
+            let mut directions = Array2::zeros((wo.nrows(), 3));
+            let mut densities = Array1::zeros(wo.nrows());
+            for (row, (wo, u)) in wo.rows().into_iter().zip(u.rows()).enumerate() {
+                let wo = unit(wo);
+                let (direction, density) = mixture.sample(wo, [u[0], u[1]]);
+                directions
+                    .row_mut(row)
+                    .assign(&ArrayView1::from(&direction));
+                densities[row] = if is_above(wo) { density } else { 0.0 };
+            }
+            Ok((directions, densities))
+        })?;
+        Ok((directions.into_pyarray(py), densities.into_pyarray(py)))
+    }
+
+    /// Densities of `sample` in 1/sr.
+    fn pdf<'py>(
+        &self,
+        py: Python<'py>,
+        wi: PyReadonlyArray2<'_, f64>,
+        wo: PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let pairs = pairs(&wi, &wo)?;
+        let densities: Array1<f64> = py.detach(|| -> PyResult<_> {
+            let mixture = self.mixture()?;
+            let density = |pair: &DirectionPair| match is_above(pair.outgoing) {
+                true => mixture.density(pair.outgoing, pair.incident),
+                false => 0.0,
+            };
+            Ok(pairs.iter().map(density).collect())
+        })?;
+        Ok(densities.into_pyarray(py))
     }
 
     fn save(&self, py: Python<'_>, path: std::path::PathBuf) -> PyResult<()> {

@@ -29,3 +29,27 @@ def test_a_diffuse_surface_is_fitted_saved_and_loaded(tmp_path):
     (tmp_path / "bad.elm").write_bytes(b"elmfile\n")
     with pytest.raises(ValueError, match="cut short"):
         brdf.load(tmp_path / "bad.elm")
+
+
+def test_samples_have_the_density_that_pdf_gives_and_its_integral_is_one():
+    wi, wo = directions(400, 4), directions(400, 5)
+    half = (wi + wo) / np.linalg.norm(wi + wo, axis=1, keepdims=True)
+    values = 0.1 + 2 * np.exp((half[:, 2] - 1) / 0.02)
+    model = brdf.fit(wi, wo, values, n_neurons=60)
+    viewer = np.array([0.6, 0.0, 0.8])
+    u = np.random.default_rng(6).random((20_000, 2))
+    drawn, density = model.sample(viewer, u)
+    assert drawn.shape == (20_000, 3) and density.shape == (20_000,)
+    kept = density > 0
+    np.testing.assert_allclose(model.pdf(drawn[kept], viewer), density[kept], rtol=1e-9)
+    # Uniform directions of the hemisphere have the density 1 / 2 pi.
+    z, angle = u[:, 0], 2 * np.pi * u[:, 1]
+    r = np.sqrt(1 - z**2)
+    uniform = np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1)
+    assert abs(2 * np.pi * model.pdf(uniform, viewer).mean() - 1) < 0.05
+    # Both estimate the albedo at this viewer.
+    by_lobes = (model.eval(drawn[kept], viewer)[:, 0] * drawn[kept, 2] / density[kept]).sum() / len(u)
+    by_uniform = (model.eval(uniform, viewer)[:, 0] * z).mean() * 2 * np.pi
+    np.testing.assert_allclose(by_lobes, by_uniform, rtol=0.05)
+    with pytest.raises(ValueError, match="u must have shape"):
+        model.sample(viewer, u[:, :1])

@@ -18,18 +18,6 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 from elm_learn import ElmClassifier, ElmRegressor
 
 
-# The search of settings, and a classifier's ridge, leave out a row with all of its weight; a row that is there
-# twice loses one of two.
-WEIGHTS = {
-    "check_sample_weight_equivalence_on_dense_data": "the library's leave-one-out is not that of repeated rows"
-}
-
-
-def expected_failures(estimator):
-    keeps_weights = isinstance(estimator, ElmRegressor) and estimator.n_neurons != "auto"
-    return {} if keeps_weights else WEIGHTS
-
-
 @parametrize_with_checks(
     [
         ElmRegressor(),
@@ -37,7 +25,6 @@ def expected_failures(estimator):
         ElmRegressor(n_neurons=50),
         ElmClassifier(n_neurons=50),
     ],
-    expected_failed_checks=expected_failures,
 )
 def test_check_estimator(estimator, check):
     check(estimator)

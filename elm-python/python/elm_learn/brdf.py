@@ -48,6 +48,47 @@ class Brdf:
         values = self._model.eval(wi.reshape(-1, 3), wo.reshape(-1, 3))
         return values.reshape(*shape, -1)
 
+    def sample(self, wo, u):
+        """Draw directions towards the light, about in proportion to the value times the cosine.
+
+        Parameters
+        ----------
+        wo : array-like of shape (..., 3)
+            Towards the viewer; made unit vectors.
+        u : array-like of shape (..., 2)
+            Uniform numbers from 0 to 1, broadcast against ``wo``.
+
+        Returns
+        -------
+        wi : ndarray of shape (..., 3)
+        pdf : ndarray of shape (...)
+            Their densities in 1/sr; 0 where there is nothing to draw.
+        """
+        wo, u = _directions("wo", wo), np.asarray(u, dtype=np.float64)
+        if u.ndim == 0 or u.shape[-1] != 2:
+            raise ValueError(f"u must have shape (..., 2), got {u.shape}")
+        shape = np.broadcast_shapes(wo.shape[:-1], u.shape[:-1])
+        wo, u = np.broadcast_to(wo, (*shape, 3)), np.broadcast_to(u, (*shape, 2))
+        wi, pdf = self._model.sample(wo.reshape(-1, 3), u.reshape(-1, 2))
+        return wi.reshape(*shape, 3), pdf.reshape(shape)
+
+    def pdf(self, wi, wo):
+        """The density with which :meth:`sample` draws ``wi``.
+
+        Parameters
+        ----------
+        wi, wo : array-like of shape (..., 3)
+            Towards the light, towards the viewer; made unit vectors.
+
+        Returns
+        -------
+        ndarray of shape (...)
+            In 1/sr.
+        """
+        wi, wo = np.broadcast_arrays(_directions("wi", wi), _directions("wo", wo))
+        pdf = self._model.pdf(wi.reshape(-1, 3), wo.reshape(-1, 3))
+        return pdf.reshape(wi.shape[:-1])
+
     def save(self, path):
         """Write a file that ``elm-brdf`` and :func:`load` read; JSON where the name ends in ``.json``."""
         self._model.save(path)
