@@ -75,12 +75,13 @@ pub(crate) fn all() -> Result {
         say("skipped: tests on real measurements");
         Tiers::without_data().run()?;
     }
-    // Not among the default features; without data one of them says 'skipped'.
+    // Not among the default features; without data one of them says 'skipped'. Of the whole workspace, so
+    // that dependencies have the features of the builds above and are not built again.
     run(command(
-        "cargo clippy -p elm-brdf --all-targets --features fetch --locked -- -D warnings",
+        "cargo clippy --workspace --all-targets --features elm-brdf/fetch --locked -- -D warnings",
     ))?;
     run(command(
-        "cargo test -p elm-brdf --features fetch --test fetch --test help --locked \
+        "cargo test --workspace --features elm-brdf/fetch --test fetch --test help --locked \
          -- --include-ignored",
     ))?;
 
