@@ -31,7 +31,7 @@ impl<A: Scalar, D: TargetDim> RepeatedRows<A, D> {
         let of_group = |groups: &[usize]| rows.iter().map(|&row| groups[row]).collect();
         Some(Self {
             inputs: data.inputs().select(Axis(0), &rows),
-            targets: data.targets().select(Axis(0), &rows),
+            targets: D::of_matrix(data.target_matrix().select(Axis(0), &rows)),
             groups: data.groups().map(of_group),
         })
     }
