@@ -127,7 +127,11 @@ impl<A: Real> Layers<A> {
 }
 
 /// A network with these hidden weights and biases, three outputs at a time.
-fn fused<A: Real>(network: &Elm<f64>, weights: &Array2<f64>, biases: &Array1<f64>) -> Vec<Fused<A>> {
+fn fused<A: Real>(
+    network: &Elm<f64>,
+    weights: &Array2<f64>,
+    biases: &Array1<f64>,
+) -> Vec<Fused<A>> {
     let (beta, intercept) = (network.beta(), network.intercept());
     let triple = |first: usize| {
         let three = |of: &dyn Fn(usize) -> Option<f64>| {

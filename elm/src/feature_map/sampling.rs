@@ -1,8 +1,6 @@
 //! Draws the random layer from a seed.
 
-use std::cmp::Ordering;
-
-use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis, s};
+use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, s};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{StandardNormal, StandardUniform};
@@ -158,12 +156,7 @@ impl<A: Scalar> FeatureMapParams<A> {
         weights: Option<ArrayView1<'_, A>>,
     ) -> HiddenLayer<A> {
         let x = x.into();
-        let at_rows = |group: &NeuronGroup<A>| group.biases == Biases::AtTrainingRows;
-        let places = if self.groups().any(at_rows) {
-            Places::in_order(x.x, weights)
-        } else {
-            Places::new(x.nrows(), weights)
-        };
+        let places = Places::new(x.nrows(), weights);
         let neurons = self.groups().map(|group| group.count).sum();
         let mut layer = HiddenLayer {
             weights: Array2::zeros((x.ncols(), neurons)),
@@ -286,8 +279,6 @@ struct Places {
     rows: usize,
     /// For weights that differ the sum of those up to and with each row, as a share of all.
     shares: Option<Vec<f64>>,
-    /// The rows in the order that they are drawn in, where that is not their own.
-    order: Option<Vec<usize>>,
 }
 
 impl Places {
@@ -305,59 +296,25 @@ impl Places {
             shares.iter_mut().for_each(|share| *share /= sum.value());
             shares
         });
-        Self {
-            rows,
-            shares,
-            order: None,
-        }
-    }
-
-    /// In the order of the inputs, by the first, then the second and so on: what is drawn does not depend
-    /// on how rows are arranged.
-    fn in_order<A: Scalar>(x: ArrayView2<'_, A>, weights: Option<ArrayView1<'_, A>>) -> Self {
-        let mut order: Vec<usize> = (0..x.nrows()).collect();
-        order.sort_by(|&a, &b| {
-            let pairs = x.row(a).into_iter().zip(x.row(b));
-            let unequal = pairs
-                .map(|(a, b)| a.as_f64().total_cmp(&b.as_f64()))
-                .find(|order| order.is_ne());
-            unequal.unwrap_or(Ordering::Equal)
-        });
-        let weights = weights.map(|weights| weights.select(Axis(0), &order));
-        let weights = weights.as_ref().map(|weights| weights.view());
-        Self {
-            order: Some(order),
-            ..Self::new(x.nrows(), weights)
-        }
-    }
-
-    /// The row that is drawn at a place of the order.
-    fn row(&self, place: usize) -> usize {
-        let ordered = self.order.as_ref().and_then(|order| order.get(place));
-        ordered.copied().unwrap_or(place)
+        Self { rows, shares }
     }
 
     /// A row.
     fn any(&self, random: &mut ChaCha8Rng) -> usize {
         match &self.shares {
-            None => self.row(random.random_range(0..self.rows.max(1))),
+            None => random.random_range(0..self.rows.max(1)),
             Some(shares) => {
                 // As many random bits as an unweighted draw takes, and used alike: rows that are
                 // repeated one after the other are drawn as one that weighs as much.
                 let place = f64::from(random.random::<u32>()) / 2.0_f64.powi(32);
                 let row = shares.partition_point(|share| *share <= place);
-                self.row(row.min(self.rows.saturating_sub(1)))
+                row.min(self.rows.saturating_sub(1))
             }
         }
     }
 
     /// So many rows, none twice until all are taken. Fewer are the beginning of more.
     fn without_repetition(&self, count: usize, random: &mut ChaCha8Rng) -> Vec<usize> {
-        let places = self.places_without_repetition(count, random).into_iter();
-        places.map(|place| self.row(place)).collect()
-    }
-
-    fn places_without_repetition(&self, count: usize, random: &mut ChaCha8Rng) -> Vec<usize> {
         let mut rows: Vec<usize> = (0..self.rows).collect();
         if rows.is_empty() {
             return rows;
