@@ -15,6 +15,8 @@ from ._elm_learn import Settings
 
 #: Neurons of ``partial_fit`` where their number is to be chosen.
 PARTIAL_NEURONS = 200
+#: Rows that a search of settings looks at, at most.
+SEARCH_ROWS = 2000
 #: Multiply-adds from which a fit runs where Ctrl-C can end the wait for it.
 LONG = 2e9
 FLOATS = (np.float64, np.float32)
@@ -87,6 +89,16 @@ class ElmBase(BaseEstimator):
         if sample_weight is None:
             return None
         return _check_sample_weight(sample_weight, X, dtype=X.dtype, ensure_non_negative=True)
+
+    def _arranged(self, X, *columns):
+        """The rows in the order of their values, where settings are searched for on all of them.
+
+        The search lays neurons on rows that it draws by index; how rows are arranged is to make no difference.
+        """
+        if self.n_neurons != "auto" or X.shape[0] > SEARCH_ROWS:
+            return (X, *columns)
+        order = np.lexsort(X.T[::-1])
+        return (X[order], *(None if column is None else column[order] for column in columns))
 
     def _work(self, X) -> float:
         if self.n_neurons == "auto" or self.scale == "loo":

@@ -120,6 +120,7 @@ class ElmClassifier(ClassifierMixin, ElmBase):
                 f"{self.classes_[0]!r}"
             )
         weights = self._weights(X, sample_weight)
+        X, codes, weights = self._arranged(X, codes, weights)
         balanced = isinstance(self.class_weight, str) and self.class_weight == "balanced"
         arguments = (
             settings,

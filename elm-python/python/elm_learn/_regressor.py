@@ -117,6 +117,7 @@ class ElmRegressor(RegressorMixin, ElmBase):
         weights = self._weights(X, sample_weight)
         self._single = y.ndim == 1
         targets = y[:, None] if self._single else y
+        X, targets, weights = self._arranged(X, targets, weights)
         arguments = (settings, X, targets, weights, bool(self.intervals))
         network = interruptible(self._work(X), Network.fit, *arguments)
         self._rows = None

@@ -1,6 +1,6 @@
 //! From the scores of a linear solve to probabilities: one slope and a shift for each class.
 
-use ndarray::{Array1, Array2, ArrayRef1, ArrayView1, ArrayView2};
+use ndarray::{Array1, Array2, ArrayRef1, ArrayView1, ArrayView2, s};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
@@ -52,6 +52,9 @@ impl TryFrom<Parts> for Calibration {
 
 /// Newton's steps at most; the function is convex, and ten are usual.
 const STEPS: usize = 50;
+/// Twice what the loss may fall by, from where on whole steps converge: too little for values of the loss to
+/// tell, whose rounding would leave half of the digits.
+const NEAR: f64 = 1e-8;
 /// Keeps shifts apart from their common sum, which probabilities do not depend on.
 const DAMPING: f64 = 1e-9;
 /// Work that a step may cost, in products.
@@ -180,6 +183,7 @@ impl Problem<'_> {
 
     fn descend(&self, mut point: Array1<f64>, slope_is_free: bool) -> Array1<f64> {
         let mut loss = self.loss(&point);
+        let mut last = f64::INFINITY;
         for _ in 0..STEPS {
             let (mut gradient, mut curvature) = self.derivatives(&point);
             if !slope_is_free {
@@ -191,14 +195,23 @@ impl Problem<'_> {
             let step = Cholesky::new(curvature)
                 .and_then(|factor| factor.solve(&gradient.view().insert_axis(ndarray::Axis(1))));
             let Ok(step) = step else { break };
-            let fall = gradient.dot(&step.column(0));
-            let Some((next, lower)) = self.search(&point, step.column(0), loss) else {
+            let mut step = step.column(0).to_owned();
+            let fall = gradient.dot(&step);
+            // Of the common sum the gradient says nothing but rounding, and the damping little against it.
+            let common = step.slice(s![1..]).mean().unwrap_or(0.0);
+            step.slice_mut(s![1..]).mapv_inplace(|shift| shift - common);
+            if fall < NEAR {
+                if fall >= last {
+                    break;
+                }
+                point -= &step;
+                last = fall;
+                continue;
+            }
+            let Some((next, lower)) = self.search(&point, step.view(), loss) else {
                 break;
             };
             (point, loss) = (next, lower);
-            if fall < 1e-14 {
-                break;
-            }
         }
         point
     }
