@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use elm::persist;
-use elm::uncertainty::UncertainElm;
+use elm::uncertainty::CompactUncertainElm;
 use elm::{Accumulator, Dataset, Elm, Predictor, Scalar, onnx};
 use ndarray::{Array2, ArrayView1, ArrayView2, Axis, Ix2, concatenate};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
@@ -19,8 +19,8 @@ use crate::settings::{Recipe, Settings, error};
 pub(crate) struct Packed<A: Scalar> {
     model: Elm<A>,
     predictor: OnceLock<Predictor<A>>,
-    /// What intervals need; not in files.
-    uncertain: Option<UncertainElm<A>>,
+    /// What intervals need.
+    uncertain: Option<CompactUncertainElm<A>>,
     input_scales: Vec<f64>,
 }
 
@@ -34,7 +34,15 @@ impl<A: Scalar> Packed<A> {
         }
     }
 
-    fn uncertain(&self) -> PyResult<&UncertainElm<A>> {
+    fn uncertain_of(uncertain: CompactUncertainElm<A>) -> Self {
+        let model = uncertain.model().clone();
+        Self {
+            uncertain: Some(uncertain),
+            ..Self::of(model)
+        }
+    }
+
+    fn uncertain(&self) -> PyResult<&CompactUncertainElm<A>> {
         let without = || PyTypeError::new_err("fitted without intervals");
         self.uncertain.as_ref().ok_or_else(without)
     }
@@ -75,7 +83,7 @@ fn fit<A: Scalar>(
     let mut packed = Packed::of(model);
     packed.input_scales = params.input_scales().to_vec();
     if intervals {
-        packed.uncertain = Some(params.fit_uncertain(&data).map_err(error)?);
+        packed.uncertain = Some(params.fit_uncertain(&data).map_err(error)?.compact());
     }
     Ok(packed)
 }
@@ -187,15 +195,25 @@ impl Network {
     }
 
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let bytes = either!(&self.kind, model => persist::to_bytes(&model.model)).map_err(error)?;
+        let bytes = either!(&self.kind, model => match &model.uncertain {
+            Some(uncertain) => persist::to_bytes(uncertain),
+            None => persist::to_bytes(&model.model),
+        });
+        let bytes = bytes.map_err(error)?;
         Ok(PyBytes::new(py, &bytes))
     }
 
     #[staticmethod]
     fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
-        let kind = match Either::load(bytes)? {
-            Either::F32(model) => Kind::F32(Packed::of(model)),
-            Either::F64(model) => Kind::F64(Packed::of(model)),
+        let is_other = |reason: &persist::Error| matches!(reason, persist::Error::Kind { .. });
+        let kind = match Either::try_load(bytes) {
+            Err(reason) if is_other(&reason) => match Either::load(bytes)? {
+                Either::F32(model) => Kind::F32(Packed::uncertain_of(model)),
+                Either::F64(model) => Kind::F64(Packed::uncertain_of(model)),
+            },
+            Err(reason) => return Err(error(reason)),
+            Ok(Either::F32(model)) => Kind::F32(Packed::of(model)),
+            Ok(Either::F64(model)) => Kind::F64(Packed::of(model)),
         };
         Ok(Self { kind })
     }

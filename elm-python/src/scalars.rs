@@ -37,12 +37,16 @@ impl<S, D> Either<S, D> {
 impl<S: Persist, D: Persist> Either<S, D> {
     /// Reads a file of either type.
     pub(crate) fn load(bytes: &[u8]) -> PyResult<Self> {
+        Self::try_load(bytes).map_err(error)
+    }
+
+    pub(crate) fn try_load(bytes: &[u8]) -> Result<Self, persist::Error> {
         match persist::from_bytes::<D>(bytes) {
             Ok(double) => Ok(Self::F64(double)),
-            Err(persist::Error::ScalarType { .. }) => persist::from_bytes::<S>(bytes)
-                .map(Self::F32)
-                .map_err(error),
-            Err(reason) => Err(error(reason)),
+            Err(persist::Error::ScalarType { .. }) => {
+                persist::from_bytes::<S>(bytes).map(Self::F32)
+            }
+            Err(reason) => Err(reason),
         }
     }
 }

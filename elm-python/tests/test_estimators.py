@@ -55,8 +55,11 @@ def test_intervals_cover_and_deviations_grow_outside(curve):
     assert 0.8 < np.mean((low <= y[200:]) & (y[200:] <= high)) <= 1
     inside, outside = model.predict_std(np.array([[0.0, 0.0], [9.0, 0.0]]))
     assert outside > 2 * inside
+    again = pickle.loads(pickle.dumps(model))
+    np.testing.assert_array_equal(again.predict_interval(X), model.predict_interval(X))
+    np.testing.assert_array_equal(again.predict(X), model.predict(X))
     with pytest.raises(ValueError, match="intervals=True"):
-        pickle.loads(pickle.dumps(model)).predict_interval(X)
+        ElmRegressor(40, random_state=0).fit(X, y).predict_interval(X)
 
 
 @pytest.mark.parametrize("kind", [ElmRegressor, ElmClassifier])

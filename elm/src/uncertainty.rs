@@ -30,6 +30,9 @@
 //! groups' held-out errors (CV+ in the same paper, not studentized), and $\sigma^2$ is the mean square of
 //! those.
 //!
+//! [`UncertainElm::compact`] leaves the rows out: what remains fits in a file, has the same deviations, and
+//! has the jackknife's intervals.
+//!
 //! Both take the random layer, its standardization and $\lambda$ as given. Where these were chosen on
 //! the same rows, as $\lambda$ is by default and everything by [`ElmParams::auto`], nothing is
 //! guaranteed: errors are larger than either says, a little with many rows, and by a half with ten. There
@@ -49,7 +52,10 @@
 //! # Ok::<(), elm::Error>(())
 //! ```
 
+mod compact;
 mod counted_rows;
+#[cfg(feature = "persist")]
+mod files;
 mod interval;
 
 use ndarray::{Array, Array1, Array2, ArrayRef2, Axis, Ix2, Zip, s};
@@ -62,6 +68,8 @@ use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::solve::Solver;
 use crate::stats;
+pub use compact::CompactUncertainElm;
+use compact::{Member, finite};
 use counted_rows::CountedRows;
 
 /// A fitted network that knows how far off it may be; made by [`ElmParams::fit_uncertain`] and
@@ -85,9 +93,10 @@ use counted_rows::CountedRows;
 /// ```
 #[derive(Debug, Clone)]
 pub struct UncertainElm<A: Scalar, D: TargetDim = Ix2> {
-    /// The mean of the members, the member itself where there is one.
-    model: Elm<A, D>,
-    members: Vec<Member<A, D>>,
+    /// The networks, and what needs no rows.
+    compact: CompactUncertainElm<A, D>,
+    /// Of each member what needs the rows.
+    members: Vec<LeftOut<A>>,
     /// Leave-one-out residuals of the mean, shape (rows, outputs).
     left_out: Array2<A>,
     /// The rows that count, and what they weigh.
@@ -95,31 +104,16 @@ pub struct UncertainElm<A: Scalar, D: TargetDim = Ix2> {
     /// Their sizes over the deviation of a new observation there, in units of the noise, by the fit
     /// without the row.
     scores: Array2<A>,
-    /// Estimated standard deviation of the noise, per output.
-    noise: Array1<A>,
-    /// Mean square slope of each output along each input of the layer over the training rows, shape
-    /// (inputs, outputs).
-    steepness: Array2<A>,
 }
 
-/// One of the networks whose mean is predicted.
+/// What a network predicts without some of its rows.
 #[derive(Debug, Clone)]
-struct Member<A: Scalar, D: TargetDim> {
-    model: Elm<A, D>,
+struct LeftOut<A: Scalar> {
     validator: CrossValidator<A>,
     /// Leave-one-out residuals, shape (rows, outputs).
-    left_out: Array2<A>,
+    residuals: Array2<A>,
     /// One minus the leverage of each row, shape (rows, outputs).
     freedom: Array2<A>,
-}
-
-impl<A: Scalar, D: TargetDim> Member<A, D> {
-    /// What the posterior adds to the variance of a new observation, in units of the noise's, shape
-    /// (rows, outputs); `hidden` is this member's hidden-layer matrix.
-    fn spread(&self, hidden: &Array2<A>) -> Array2<A> {
-        let lambda = &self.model.diagnosis().lambda;
-        self.validator.variance_factor(hidden, lambda)
-    }
 }
 
 impl<A: Scalar> ElmParams<A> {
@@ -132,8 +126,8 @@ impl<A: Scalar> ElmParams<A> {
         &self,
         data: &Dataset<'_, A, D>,
     ) -> Result<UncertainElm<A, D>> {
-        let member = self.fit_member(data)?;
-        UncertainElm::new(vec![member], data)
+        let (member, left_out) = self.fit_member(data)?;
+        UncertainElm::new((vec![member], vec![left_out]), data)
     }
 
     /// Fits the mean of this many networks, which differ in their seeds alone: the parameters' seed
@@ -179,11 +173,16 @@ impl<A: Scalar> ElmParams<A> {
             let seed = self.seed().wrapping_add(number);
             self.clone().with_seed(seed).fit_member(data)
         };
-        let members = (0..members as u64).map(member).collect::<Result<_>>()?;
-        UncertainElm::new(members, data)
+        let members = (0..members as u64)
+            .map(member)
+            .collect::<Result<Vec<_>>>()?;
+        UncertainElm::new(members.into_iter().unzip(), data)
     }
 
-    fn fit_member<D: TargetDim>(&self, data: &Dataset<'_, A, D>) -> Result<Member<A, D>> {
+    fn fit_member<D: TargetDim>(
+        &self,
+        data: &Dataset<'_, A, D>,
+    ) -> Result<(Member<A, D>, LeftOut<A>)> {
         if !matches!(self.solver(), Solver::Ridge(_)) {
             return Err(Error::Conflict {
                 first: "a solver other than ridge",
@@ -200,34 +199,38 @@ impl<A: Scalar> ElmParams<A> {
             Some(groups) => validator.k_fold(groups, lambda),
             None => validator.leave_one_out(lambda),
         };
-        let left_out = held_out?.residuals().to_owned();
+        let residuals = held_out?.residuals().to_owned();
+        let posterior = validator.posterior();
         // At a training row the posterior's share of the variance, times the weight, is the leverage.
-        let mut freedom = validator.variance_factor(&hidden, lambda);
+        let mut freedom = posterior.variance_factor(&hidden, lambda);
         freedom *= &validator.weights().insert_axis(Axis(1));
         freedom.mapv_inplace(|leverage| (A::one() - leverage).max(A::epsilon()));
-        Ok(Member {
-            model,
+        let left_out = LeftOut {
             validator,
-            left_out,
+            residuals,
             freedom,
-        })
+        };
+        Ok((Member { model, posterior }, left_out))
     }
 }
 
 impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
-    fn new(members: Vec<Member<A, D>>, data: &Dataset<'_, A, D>) -> Result<Self> {
+    fn new(
+        (members, parts): (Vec<Member<A, D>>, Vec<LeftOut<A>>),
+        data: &Dataset<'_, A, D>,
+    ) -> Result<Self> {
         let (x, t) = (data.inputs(), data.target_matrix());
         let models: Vec<&Elm<A, D>> = members.iter().map(|member| &member.model).collect();
         let share = A::from_f64(members.len() as f64).recip();
-        let rows = CountedRows::new(members[0].validator.weights(), data.groups());
+        let rows = CountedRows::new(parts[0].validator.weights(), data.groups());
         let mut left_out = Array2::zeros(t.dim());
         // Times the weight of the row.
         let mut variances = Array2::ones(t.dim());
-        for member in &members {
-            left_out.scaled_add(share, &member.left_out);
+        for part in &parts {
+            left_out.scaled_add(share, &part.residuals);
             if rows.groups.is_none() {
                 // Of the fit without the row: h / (1 - h).
-                variances.zip_mut_with(&member.freedom, |v: &mut A, &f| {
+                variances.zip_mut_with(&part.freedom, |v: &mut A, &f| {
                     *v += share * (f.recip() - A::one());
                 });
             }
@@ -251,26 +254,45 @@ impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
                 // Each product is a square over 1 - h, so only rounding can make it negative.
                 A::from_f64((stats::sum(products).max(0.0) / count).sqrt())
             });
-        Ok(Self {
+        let mut sorted = scores.select(Axis(0), &rows.present);
+        for mut column in sorted.columns_mut() {
+            let mut values = column.to_vec();
+            values.sort_by(|a, b| a.as_f64().total_cmp(&b.as_f64()));
+            column.assign(&Array1::from(values));
+        }
+        let compact = CompactUncertainElm {
             steepness: steepness(&model, &x.select(Axis(0), &rows.present)),
             model,
             members,
+            scores: sorted,
+            is_studentized: rows.groups.is_none(),
+            noise,
+            mean_weight: rows.mean,
+        };
+        Ok(Self {
+            compact,
+            members: parts,
             left_out,
             rows,
             scores,
-            noise,
         })
     }
 
     /// The network; of an ensemble the mean of its members.
     #[must_use]
     pub fn model(&self) -> &Elm<A, D> {
-        &self.model
+        &self.compact.model
+    }
+
+    /// Without the rows, to be kept in a file: deviations are the same, intervals nearly.
+    #[must_use]
+    pub fn compact(&self) -> CompactUncertainElm<A, D> {
+        self.compact.clone()
     }
 
     /// The networks whose mean [`model`](Self::model) is: one, unless this is an ensemble.
     pub fn members(&self) -> impl ExactSizeIterator<Item = &Elm<A, D>> {
-        self.members.iter().map(|member| &member.model)
+        self.compact.members.iter().map(|member| &member.model)
     }
 
     /// The leave-one-out RMSE of each output, with the weights of the rows; of rows with groups that of
@@ -285,9 +307,9 @@ impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
     /// hangs on the seed, and how much better the mean is.
     #[must_use]
     pub fn members_leave_one_out(&self) -> Array2<f64> {
-        let mut all = Array2::zeros((self.members.len(), self.model.outputs()));
+        let mut all = Array2::zeros((self.members.len(), self.left_out.ncols()));
         for (mut row, member) in all.rows_mut().into_iter().zip(&self.members) {
-            row.assign(&self.rows.errors(member.left_out.view()));
+            row.assign(&self.rows.errors(member.residuals.view()));
         }
         all
     }
@@ -303,7 +325,7 @@ impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
         let x = x.as_matrix();
         let predictions = self.members().map(|member| member.predict_matrix(&x));
         let predictions = predictions.collect::<Result<Vec<_>>>()?;
-        let mean = self.model.predict_matrix(&x)?;
+        let mean = self.model().predict_matrix(&x)?;
         let mut squares = Array2::zeros(mean.dim());
         for prediction in &predictions {
             squares += &(prediction - &mean).mapv_into(|d| d * d);
@@ -315,38 +337,8 @@ impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
     /// The estimated standard deviation of the noise of each output.
     #[must_use]
     pub fn noise(&self) -> D::PerOutput<A> {
-        per_output::<D, _>(self.noise.len(), |output| self.noise[output])
-    }
-
-    /// What each output may change by, as a root mean square, between the edge of the data and rows
-    /// that lie outside; 0 for rows inside.
-    fn change_outside(&self, x: &ArrayRef2<A>) -> Array2<A> {
-        let mut change = Array2::zeros((x.nrows(), self.model.outputs()));
-        let Some(bounds) = self.model.bounds() else {
-            return change;
-        };
-        let mut excess = bounds.excess(x);
-        if let Some(scaler) = self.model.scaler() {
-            excess *= &scaler.factor();
-        }
-        let outside = |row: &usize| excess.row(*row).iter().any(|e| *e > A::zero());
-        let outside: Vec<usize> = (0..x.nrows()).filter(outside).collect();
-        let rows = x.select(Axis(0), &outside);
-        let gradients = self.model.gradients(&rows);
-        let columns = change.columns_mut().into_iter();
-        let outputs = gradients.zip(self.steepness.columns()).zip(columns);
-        for ((gradient, steepness), mut change) in outputs {
-            for (slopes, &row) in gradient.rows().into_iter().zip(&outside) {
-                let squares = Zip::from(slopes)
-                    .and(steepness)
-                    .and(excess.row(row))
-                    .fold(A::zero(), |sum, &slope, &usual, &e| {
-                        sum + (slope * slope).max(usual) * e * e
-                    });
-                change[row] = squares.sqrt();
-            }
-        }
-        change
+        let noise = &self.compact.noise;
+        per_output::<D, _>(noise.len(), |output| noise[output])
     }
 
     /// The standard deviation of a new observation: shape (rows, inputs) to (rows, outputs). Of an
@@ -356,16 +348,7 @@ impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
     /// # Errors
     /// Those of [`Elm::hidden_matrix`]; [`Error::Overflow`].
     pub fn predict_deviation<X: Inputs<A> + ?Sized>(&self, x: &X) -> Result<Array<A, D>> {
-        let x = x.as_matrix();
-        let share = A::from_f64(self.members.len() as f64).recip();
-        let mut spread = Array2::zeros((x.nrows(), self.model.outputs()));
-        for member in &self.members {
-            let hidden = member.model.hidden_matrix(&x)?;
-            spread.scaled_add(share * self.rows.mean, &member.spread(&hidden));
-        }
-        let mut deviation = spread.mapv_into(|s| (A::one() + s).sqrt()) * &self.noise;
-        deviation.zip_mut_with(&self.change_outside(&x), |d, &change| *d = d.hypot(change));
-        finite(deviation).map(D::of_matrix)
+        self.compact.predict_deviation(x)
     }
 }
 
@@ -382,14 +365,4 @@ fn steepness<A: Scalar, D: TargetDim>(model: &Elm<A, D>, x: &ArrayRef2<A>) -> Ar
         column.assign(&gradient.map_axis(Axis(0), |slopes| slopes.dot(&slopes) / count));
     }
     steepness
-}
-
-fn finite<A: Scalar>(values: Array2<A>) -> Result<Array2<A>> {
-    if values.iter().all(|value| value.is_finite()) {
-        Ok(values)
-    } else {
-        Err(Error::Overflow {
-            what: "a standard deviation",
-        })
-    }
 }

@@ -161,7 +161,7 @@ impl Material {
 
     /// Whether it was scaled down so that no albedo passes 1.
     #[must_use]
-    pub fn is_rescaled(&self) -> bool {
+    pub(crate) fn is_rescaled(&self) -> bool {
         self.scale < 1.0
     }
 

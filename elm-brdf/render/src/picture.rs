@@ -68,7 +68,7 @@ impl Bitmap {
 
     /// The picture with its labels and its caption.
     #[must_use]
-    pub fn captioned(rendering: &Rendering) -> Self {
+    pub(crate) fn captioned(rendering: &Rendering) -> Self {
         let mut picture = Self::display(rendering);
         for (label, [x, y]) in &rendering.labels {
             // Half of what the label takes, so that its ends stay inside.

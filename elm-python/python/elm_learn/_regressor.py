@@ -32,8 +32,8 @@ class ElmRegressor(RegressorMixin, ElmBase):
     direct_links : bool, default=False
         Whether inputs also reach the outputs directly (RVFL).
     intervals : bool, default=False
-        Whether to keep what :meth:`predict_interval` needs: a number for each row and neuron. It is not
-        part of a pickle.
+        Whether to keep what :meth:`predict_interval` and :meth:`predict_std` need: the square of the neurons
+        in numbers, and one for each row and output.
     random_state : int, RandomState instance or None, default=None
         Seeds the random layer; an int gives the same model on every machine.
     n_jobs : int or None, default=None
@@ -190,7 +190,7 @@ class ElmRegressor(RegressorMixin, ElmBase):
         return y[:, 0] if self._single else y
 
     def predict_interval(self, X, alpha=0.1):
-        """Intervals that hold a new observation with probability 1 - `alpha` (jackknife+).
+        """Intervals that hold a new observation with probability 1 - `alpha` (studentized jackknife).
 
         Parameters
         ----------
@@ -229,7 +229,6 @@ class ElmRegressor(RegressorMixin, ElmBase):
         network = self._fitted()
         if not network.has_intervals:
             raise ValueError(
-                "this model has no intervals: fit with intervals=True (they are not part of a pickle, nor "
-                "of partial_fit)"
+                "this model has no intervals: fit with intervals=True (partial_fit has none)"
             )
         return network

@@ -40,11 +40,12 @@
 mod evidence;
 mod fold;
 mod fold_predictions;
+mod posterior;
 mod predictions;
 
 use std::marker::PhantomData;
 
-use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, Axis, Zip};
+use ndarray::{Array1, Array2, ArrayRef2, Axis, Zip};
 
 use crate::check::check_length;
 pub use crate::dataset::{assign_blocks, assign_folds};
@@ -57,6 +58,7 @@ use crate::solve::{Lambda, LeastSquares, Reason, Ridge, Solution, in_range};
 use fold::Fold;
 pub(crate) use fold::check_several;
 pub use fold_predictions::FoldPredictions;
+pub(crate) use posterior::Posterior;
 pub use predictions::{CvPredictions, LambdaPath};
 
 /// A least-squares problem, factorized once, ready to answer what it would predict without some
@@ -164,21 +166,6 @@ impl<A: Scalar> CrossValidator<A> {
         ))
     }
 
-    /// Coordinates of new hidden rows: centered, scaled, along the right singular vectors (shape
-    /// (rows, $k$)), and the squared length that lies outside them.
-    fn coordinates(&self, hidden: &ArrayRef2<A>) -> (Array2<A>, Array1<A>) {
-        let DesignSvd { frame, vt, .. } = &self.rows.spectrum;
-        // Scaled before centering, as the difference of two huge values may overflow.
-        let scaled = hidden / frame.hidden_scale;
-        let centered = scaled - frame.hidden_mean.mapv(|m| m / frame.hidden_scale);
-        let inside = A::product(centered.view(), vt.t());
-        let length = |row: ArrayView1<'_, A>| row.dot(&row);
-        let outside = Zip::from(centered.rows())
-            .and(inside.rows())
-            .map_collect(|all, inside| (length(all) - length(inside)).max(A::zero()));
-        (inside, outside)
-    }
-
     /// The weight of each row, the largest being 1.
     pub(crate) fn weights(&self) -> Array1<A> {
         let roots = &self.rows.spectrum.frame.root_weights;
@@ -195,40 +182,18 @@ impl<A: Scalar> CrossValidator<A> {
         }
     }
 
-    /// $1/n + \tilde h^T (\tilde H^T \tilde H + \lambda)^{-1} \tilde h$ for each new hidden row and each
-    /// output's relative strength, shape (rows, outputs).
-    pub(crate) fn variance_factor(&self, hidden: &ArrayRef2<A>, lambda: &[f64]) -> Array2<A> {
-        let (inside, outside) = self.coordinates(hidden);
-        let s = &self.rows.spectrum.s;
-        let largest = s.first().copied().unwrap_or(A::zero());
-        let mut spread = Array2::zeros((hidden.nrows(), lambda.len()));
-        for (mut column, &lambda) in spread.columns_mut().into_iter().zip(lambda) {
-            let absolute = A::from_f64(lambda) * largest * largest;
-            Zip::from(&mut column)
-                .and(inside.rows())
-                .and(&outside)
-                .for_each(|spread, row, &rest| {
-                    let within: A = row
-                        .iter()
-                        .zip(s)
-                        .map(|(&p, &s)| p * p / (s * s + absolute))
-                        .sum();
-                    let beyond = if rest > A::zero() {
-                        rest / absolute
-                    } else {
-                        A::zero()
-                    };
-                    *spread = self.constant_share() + within + beyond;
-                });
-        }
-        spread
+    /// What variances of predictions need, without the rows.
+    pub(crate) fn posterior(&self) -> Posterior<A> {
+        Posterior::of(&self.rows.spectrum, self.constant_share())
     }
 
     /// $1/n + \tilde h^T (\tilde H^T \tilde H + \lambda)^{-1} \tilde h_i$ for one new hidden row and every
     /// training row $i$, times its weight: leaving out row $i$ lowers the prediction by its leave-one-out
     /// residual times this; leaving out several, by the sum of their held-out residuals times these.
     pub(crate) fn influence(&self, hidden: &ArrayRef2<A>, lambda: f64) -> Array1<A> {
-        let (inside, _) = self.coordinates(hidden);
+        let DesignSvd { frame, vt, .. } = &self.rows.spectrum;
+        let mean = frame.hidden_mean.mapv(|m| m / frame.hidden_scale);
+        let (inside, _) = posterior::coordinates(hidden, frame.hidden_scale, &mean, vt);
         let gain = self.rows.spectrum.ridge_gain(&[A::from_f64(lambda)]);
         let along = &inside.row(0) * &gain.column(0);
         let share = self.constant_share();

@@ -3,8 +3,9 @@
 use ndarray::{Array, Array1, Array2, Zip, s};
 
 use super::UncertainElm;
+use super::compact::{EDGES, rows_outside};
 use crate::dataset::{Inputs, TargetDim};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::scalar::Scalar;
 
 impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
@@ -16,36 +17,30 @@ impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
     /// Costs training rows x neurons for each row of `x`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] unless `coverage` lies strictly between 0 and 1; those of
-    /// [`Elm::predict`].
+    /// [`Error::Parameter`](crate::Error::Parameter) unless `coverage` lies strictly between 0 and 1; those
+    /// of [`Elm::predict`](crate::Elm::predict).
     pub fn predict_interval<X: Inputs<A> + ?Sized>(
         &self,
         x: &X,
         coverage: f64,
     ) -> Result<(Array<A, D>, Array<A, D>)> {
-        if !(coverage > 0.0 && coverage < 1.0) {
-            return Err(Error::Parameter {
-                name: "coverage",
-                value: coverage,
-                expected: "above 0 and below 1",
-            });
-        }
+        let rows = self.rows.present.len();
+        let outside = rows_outside(coverage, rows)?;
         let x = x.as_matrix();
-        let predicted = self.model.predict_matrix(&x)?;
+        let predicted = self.model().predict_matrix(&x)?;
         let hidden = self.members().map(|member| member.hidden_matrix(&x));
         let hidden = hidden.collect::<Result<Vec<_>>>()?;
-        let rows = self.rows.present.len();
-        // The k-th smallest and largest of n ends, k = floor(alpha (n + 1)).
-        let outside = ((1.0 - coverage) * (rows as f64 + 1.0) + 1e-9).floor() as usize;
-        // A coverage near 0 would leave out more ends than there are.
-        let outside = outside.min(rows);
         let mut low = Array2::from_elem(predicted.dim(), A::neg_infinity());
         let mut high = Array2::from_elem(predicted.dim(), A::infinity());
         if outside == 0 {
             return Ok((D::of_matrix(low), D::of_matrix(high)));
         }
-        let change = self.change_outside(&x);
-        let variance = self.variance(&hidden, predicted.dim());
+        let change = self.compact.change_outside(&x);
+        let variance = if self.compact.is_studentized {
+            self.compact.variance_of(&hidden)
+        } else {
+            Array2::ones(predicted.dim())
+        };
         let mut ends = vec![A::zero(); rows];
         for (output, scores) in self.scores.columns().into_iter().enumerate() {
             for row in 0..x.nrows() {
@@ -54,7 +49,7 @@ impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
                 halves.mapv_inplace(A::sqrt);
                 halves *= &scores;
                 let center = predicted[[row, output]];
-                let wider = A::from_f64(6.0) * change[[row, output]];
+                let wider = A::from_f64(EDGES) * change[[row, output]];
                 let mut end = |sign: A| {
                     for (end, &counted) in ends.iter_mut().zip(&self.rows.present) {
                         *end = sign * (center - moves[counted]) - halves[counted];
@@ -71,23 +66,6 @@ impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
         Ok((D::of_matrix(low), D::of_matrix(high)))
     }
 
-    /// Whether scores are relative to the deviation at their rows; not where whole groups are left out.
-    fn is_studentized(&self) -> bool {
-        self.rows.groups.is_none()
-    }
-
-    /// The variance of predictions in units of the noise: hidden values by member, shape (rows, outputs).
-    fn variance(&self, hidden: &[Array2<A>], shape: (usize, usize)) -> Array2<A> {
-        let mut variance = Array2::ones(shape);
-        if self.is_studentized() {
-            let share = A::from_f64(self.members.len() as f64).recip();
-            for (member, hidden) in self.members.iter().zip(hidden) {
-                variance.scaled_add(share * self.rows.mean, &member.spread(hidden));
-            }
-        }
-        variance
-    }
-
     /// How far a prediction (row, output) moves when each training row is left out, and its variance then.
     fn without_each_row(
         &self,
@@ -99,15 +77,16 @@ impl<A: Scalar, D: TargetDim> UncertainElm<A, D> {
         let rows = self.scores.nrows();
         let mut moves = Array1::zeros(rows);
         let mut variances = Array1::from_elem(rows, variance);
-        for (member, hidden) in self.members.iter().zip(hidden) {
-            let lambda = member.model.diagnosis().lambda[output];
+        let models = self.members.iter().zip(self.members());
+        for ((member, model), hidden) in models.zip(hidden) {
+            let lambda = model.diagnosis().lambda[output];
             let here = hidden.slice(s![row..=row, ..]);
             let pull = member.validator.influence(&here, lambda);
             Zip::from(&mut moves)
                 .and(&pull)
-                .and(member.left_out.column(output))
+                .and(member.residuals.column(output))
                 .for_each(|moved, &pull, &left_out| *moved += share * pull * left_out);
-            if self.is_studentized() {
+            if self.compact.is_studentized {
                 Zip::from(&mut variances)
                     .and(&pull)
                     .and(&self.rows.weights)

@@ -2,7 +2,8 @@
 
 use approx::assert_relative_eq;
 use elm::solve::{Lambda, LeastSquares, PseudoInverse, Ridge, Solver};
-use elm::{Activation, Dataset, ElmParams, Error};
+use elm::uncertainty::CompactUncertainElm;
+use elm::{Activation, Dataset, Elm, ElmParams, Error, persist};
 use ndarray::{Array1, Array2, Axis, Ix1, array};
 use ndarray_rand::RandomExt;
 use ndarray_rand::rand_distr::{StandardNormal, StandardUniform};
@@ -328,4 +329,76 @@ fn intervals_on_ten_rows_cover_what_is_said() {
     });
     let found = format!("given {given}, strength chosen {strength}, all chosen {all}");
     assert!(given > 0.8 && strength > 0.76 && all > 0.65, "{found}");
+}
+
+#[test]
+fn without_the_rows_deviations_are_the_same_and_intervals_cover_as_often() {
+    let (x, t) = problem(200, 0.2, 31);
+    let (new, clean) = problem(4000, 0.0, 32);
+    let (_, noisy) = problem(4000, 0.2, 32);
+    let data = Dataset::new(&x, &t).unwrap();
+    for fitted in [
+        params().fit_uncertain(&data).unwrap(),
+        params().fit_ensemble(3, &data).unwrap(),
+    ] {
+        let bytes = persist::to_bytes(&fitted.compact()).unwrap();
+        let compact: CompactUncertainElm<f64, Ix1> = persist::from_bytes(&bytes).unwrap();
+        assert_eq!(compact, fitted.compact());
+        assert_eq!(
+            compact.model().predict(&new).unwrap(),
+            fitted.model().predict(&new).unwrap()
+        );
+        assert_eq!(
+            compact.predict_deviation(&new).unwrap(),
+            fitted.predict_deviation(&new).unwrap()
+        );
+        let (low, high) = compact.predict_interval(&new, 0.9).unwrap();
+        let (plus_low, plus_high) = fitted.predict_interval(&new, 0.9).unwrap();
+        let width = (&high - &low).mean().unwrap();
+        let apart = (&low - &plus_low).mapv(f64::abs).mean().unwrap()
+            + (&high - &plus_high).mapv(f64::abs).mean().unwrap();
+        assert!(apart < 0.05 * width, "{apart} of {width}");
+        // Of the same inputs, with the noise and without it.
+        let inside = |values: &Array1<f64>| {
+            let ends = low.iter().zip(&high);
+            let inside = values
+                .iter()
+                .zip(ends)
+                .filter(|(t, (low, high))| *low <= t && t <= high);
+            inside.count() as f64 / 4000.0
+        };
+        assert!((0.85..0.95).contains(&inside(&noisy)), "{}", inside(&noisy));
+        assert!(inside(&clean) > 0.98);
+    }
+    assert!(matches!(
+        params()
+            .fit_uncertain(&data)
+            .unwrap()
+            .compact()
+            .predict_interval(&new, 1.0),
+        Err(Error::Parameter {
+            name: "coverage",
+            ..
+        })
+    ));
+}
+
+#[test]
+fn files_with_uncertainty_are_no_other_files_and_damage_is_an_error() {
+    let (x, t) = problem(40, 0.2, 33);
+    let data = Dataset::new(&x, &t).unwrap();
+    let compact = params().fit_uncertain(&data).unwrap().compact();
+    let bytes = persist::to_bytes(&compact).unwrap();
+    assert!(persist::from_bytes::<Elm<f64, Ix1>>(&bytes).is_err());
+    for end in [0, 20, bytes.len() / 2, bytes.len() - 1] {
+        let cut = persist::from_bytes::<CompactUncertainElm<f64, Ix1>>(&bytes[..end]);
+        assert!(cut.is_err(), "{end}");
+    }
+    // What is whole but does not fit together.
+    let json = persist::to_json(&compact).unwrap();
+    let mut value: serde_json::Value = serde_json::from_str(&json).unwrap();
+    value["contents"]["noise"] = serde_json::json!({"v": 1, "dim": [2], "data": [0.1, 0.1]});
+    let error = persist::from_bytes::<CompactUncertainElm<f64, Ix1>>(value.to_string().as_bytes());
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("noise"), "{error}");
 }
