@@ -36,6 +36,7 @@
 //! triangle of the centered problem, and the intercept is as unpenalized as in a batch fit.
 
 mod chunks;
+mod forget;
 mod leverage;
 mod likeness;
 #[cfg(feature = "serde")]

@@ -9,7 +9,7 @@ use crate::Result;
 use crate::run::{command, root, run, say};
 
 /// Each table's name, where it stands in docs/reports/, and the command that prints it; `{curet}`,
-/// `{rgl}` and `{nbrdf}` stand for the folders of real measurements.
+/// `{rgl}`, `{nbrdf}` and `{tables}` stand for the folders of real measurements.
 const TABLES: &[(&str, &str, &str)] = &[
     (
         "compare",
@@ -52,6 +52,7 @@ const TABLES: &[(&str, &str, &str)] = &[
         "benchmarks.md: the whole paper",
         "paper_time {curet}",
     ),
+    ("tables", "tables.md", "tables --data {tables} --splits 2"),
     ("growth", "benchmarks.md: growth", "growth"),
     ("accumulate", "benchmarks.md: rows in chunks", "accumulate"),
     (
@@ -126,6 +127,7 @@ fn make(name: &str, line: &str) -> Result {
         ("{curet}", elm_test_support::curet as fn() -> _),
         ("{rgl}", || elm_test_support::folder("rgl")),
         ("{nbrdf}", || elm_test_support::folder("nbrdf")),
+        ("{tables}", || elm_test_support::folder("tables")),
     ] {
         if line.contains(placeholder) {
             let folder = folder().ok_or(format!("'{name}' needs real measurements"))?;

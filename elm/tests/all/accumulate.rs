@@ -506,3 +506,50 @@ fn a_damaged_accumulator_is_not_read() {
     let empty: Accumulator<f64> = serde_json::from_value(empty).unwrap();
     assert!(matches!(empty.fit(), Err(Error::Overflow { .. })));
 }
+
+#[test]
+fn what_is_forgotten_weighs_as_much_as_in_a_weighted_batch() {
+    let (x, t) = data::<f64>(120, 5);
+    let age = |row: usize| 5 - row / 20;
+    let weights = Array1::from_shape_fn(120, |row| 0.7_f64.powi(age(row) as i32));
+    let params = ElmParams::new(10).with_solver(Ridge::relative(1e-6));
+    let batch = Dataset::new(&x, &t).unwrap();
+    let batch = batch.with_weights(&weights).unwrap();
+    let batch = params.fit_dataset(&batch).unwrap();
+    let scaler = Scaler::measured_weighted(&x, &weights).unwrap();
+    let mut recent = Accumulator::with_scaler(&params, scaler, 2).unwrap();
+    for start in (0..120).step_by(20) {
+        recent.forget(0.7).unwrap();
+        let range = s![start..start + 20, ..];
+        recent.push(&x.slice(range), &t.slice(range)).unwrap();
+    }
+    assert_same_fit(&recent.fit().unwrap(), &batch, &x, "forgotten");
+    assert_eq!(recent.rows(), 120);
+    for wrong in [-0.1, 1.1, f64::NAN] {
+        let error = recent.forget(wrong).unwrap_err();
+        assert!(matches!(error, Error::Parameter { name: "factor", .. }));
+    }
+    recent.forget(0.0).unwrap();
+    assert!(matches!(recent.fit(), Err(Error::Empty { .. })));
+}
+
+#[test]
+fn a_fit_that_forgets_follows_a_drift_for_ever() {
+    let (x, _) = data::<f64>(60, 5);
+    let scaler = Scaler::measured(&x).unwrap();
+    let params = ElmParams::new(12).with_solver(Ridge::relative(1e-8));
+    let none = Accumulator::<f64>::with_scaler(&params, scaler, 1).unwrap();
+    let target = |day: f64| x.column(0).mapv(|x| x * day).insert_axis(Axis(1));
+    let mut recent = none.clone();
+    for day in 0..3000 {
+        recent.forget(0.5).unwrap();
+        recent.push(&x, &target(f64::from(day))).unwrap();
+    }
+    // Rows are of age 1 in the mean, and a fit of a given strength is linear in the targets.
+    let mut once = none;
+    once.push(&x, &target(2998.0)).unwrap();
+    let [recent, once] = [recent, once].map(|rows| rows.fit().unwrap().predict(&x).unwrap());
+    let most = once.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let error = (recent - &once).mapv(f64::abs);
+    assert!(error.iter().all(|e| *e < 1e-6 * most), "{error}");
+}
