@@ -43,6 +43,34 @@ impl Format {
         }
     }
 
+    /// What the names of its files end in, in small letters.
+    #[must_use]
+    pub fn extensions(self) -> &'static [&'static str] {
+        match self {
+            Self::Scattered => &["csv", "tsv"],
+            Self::Merl => &["binary"],
+            Self::Rgl => &["bsdf"],
+            Self::Pbrt => &["brdf"],
+        }
+    }
+
+    /// Whether channels and other columns are chosen while the file is read, not afterwards.
+    fn chooses_columns(self) -> bool {
+        match self {
+            Self::Scattered => true,
+            Self::Merl | Self::Rgl | Self::Pbrt => false,
+        }
+    }
+
+    /// Whether values are as they were measured, so that some may stand for none; a table of a formula has
+    /// no such fill values.
+    fn is_measured(self) -> bool {
+        match self {
+            Self::Scattered | Self::Pbrt => true,
+            Self::Merl | Self::Rgl => false,
+        }
+    }
+
     /// The format of a file: by its first bytes where they tell, otherwise by the end of its name. A file
     /// compressed by gzip is of the format of what it holds; `-`, standard input, is a table.
     ///
@@ -72,20 +100,18 @@ impl Format {
         }
         let inner = uncompressed(path);
         let end = inner.extension().unwrap_or_default();
-        [
-            ("csv", Self::Scattered),
-            ("tsv", Self::Scattered),
-            ("binary", Self::Merl),
-            ("bsdf", Self::Rgl),
-            ("brdf", Self::Pbrt),
-        ]
-        .into_iter()
-        .find(|(name, _)| end.eq_ignore_ascii_case(name))
-        .map(|(_, format)| format)
-        .or_else(|| scattered::begins(&start).then_some(Self::Scattered))
-        .ok_or_else(|| Error::UnknownFormat {
-            path: path.to_owned(),
-        })
+        let is_of = |format: &Self| {
+            let extensions = format.extensions().iter();
+            extensions
+                .clone()
+                .any(|name| end.eq_ignore_ascii_case(name))
+        };
+        let named = Self::ALL.into_iter().find(is_of);
+        named
+            .or_else(|| scattered::begins(&start).then_some(Self::Scattered))
+            .ok_or_else(|| Error::UnknownFormat {
+                path: path.to_owned(),
+            })
     }
 }
 
@@ -151,7 +177,7 @@ impl FromStr for Format {
     type Err = Error;
 
     /// # Errors
-    /// [`Error::UnknownFormatName`] for anything but the four names, in either case.
+    /// [`Error::UnknownFormatName`] for anything but a [name](Self::name), in either case.
     fn from_str(text: &str) -> Result<Self, Error> {
         Self::ALL
             .into_iter()
@@ -246,15 +272,13 @@ pub fn open(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Opened, Err
         Format::Rgl => (Rgl::read(path)?.samples(&options.sampling)?, 0, Vec::new()),
         Format::Pbrt => (pbrt::read_with_missing(path)?, 0, Vec::new()),
     };
-    if matches!(format, Format::Merl | Format::Rgl | Format::Pbrt) {
+    if !format.chooses_columns() {
         samples = chosen(path, samples, &options.columns)?;
     }
     if !options.columns.wavelengths.is_empty() {
         samples.channels = at_wavelengths(path, &samples.channels, &options.columns.wavelengths)?;
     }
-    // A formula's table has no fill values.
-    let measured = matches!(format, Format::Scattered | Format::Pbrt);
-    let fills = if measured && options.invalid != Invalid::Keep {
+    let fills = if format.is_measured() && options.invalid != Invalid::Keep {
         fill_values(&samples.values)
     } else {
         Vec::new()

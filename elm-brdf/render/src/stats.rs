@@ -6,8 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Work that a renderer may leave out; each can be switched off.
 ///
-/// The first four are lossless: the picture is the same bit for bit. The others stay within a
-/// bound.
+/// Those of [`LOSSLESS`](Self::LOSSLESS) leave the picture the same bit for bit; the others stay within a bound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Optimizations {
     /// Load and train only materials that some ray meets, when it first does.
@@ -194,7 +193,7 @@ pub(crate) struct TileStats {
     /// Evaluations by material.
     pub(crate) evaluations: Vec<u64>,
     /// Evaluations left out by [`Reason`] and material.
-    skipped: [Vec<u64>; 7],
+    skipped: [Vec<u64>; Reason::ALL.len()],
     pub(crate) samples: u64,
     pub(crate) samples_skipped: u64,
     pub(crate) rays: u64,

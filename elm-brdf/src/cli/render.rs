@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
+use elm_datasets::Format;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::common::{DataFolder, library};
@@ -68,8 +69,13 @@ pub(super) struct Arguments {
 /// The built-in scene that shows the material of a file.
 const PREVIEW: &str = "mesh";
 
-/// What the names of materials' files end in; any other file is a scene.
-const MATERIALS: [&str; 8] = ["elm", "json", "csv", "tsv", "gz", "binary", "bsdf", "brdf"];
+/// Whether a file of this name holds a material: a model, measurements or a table. Any other is a scene.
+fn is_material(path: &Path) -> bool {
+    let measured = Format::ALL.iter().flat_map(|format| format.extensions());
+    let mut known = measured.chain(&["elm", "json", "gz"]);
+    path.extension()
+        .is_some_and(|end| known.any(|name| end.eq_ignore_ascii_case(name)))
+}
 
 /// Reads WIDTHxHEIGHT.
 fn size(text: &str) -> Result<(u32, u32), String> {
@@ -136,12 +142,7 @@ impl Arguments {
     /// A scene's file, or the built-in scene that shows the material of a file.
     fn scene_file(&self) -> Result<Sheet, Failure> {
         let path = Path::new(&self.scene);
-        let is_material = path.extension().is_some_and(|end| {
-            MATERIALS
-                .iter()
-                .any(|known| end.eq_ignore_ascii_case(known))
-        });
-        if !is_material || !path.is_file() {
+        if !is_material(path) || !path.is_file() {
             return Ok(Scene::read(path).map_err(Error::from)?.into());
         }
         if self.material.is_some() {
