@@ -1,4 +1,4 @@
-//! Fits, saves, loads and asks how sure the network is:
+//! Fits, saves, loads, and asks the network that was loaded how sure it is:
 //!
 //! `cargo run --release -p elm-learn --example save_load`
 
@@ -6,7 +6,8 @@
 
 use std::error::Error;
 
-use elm::{Dataset, Elm, ElmParams, persist};
+use elm::uncertainty::CompactUncertainElm;
+use elm::{Dataset, ElmParams, persist};
 use elm_datasets::toy;
 use ndarray::{Axis, Ix1};
 
@@ -17,15 +18,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     let tuned = ElmParams::auto().tune(&data)?;
 
     let path = std::env::temp_dir().join("friedman3.elm");
-    persist::save(&tuned.model, &path)?;
-    let model: Elm<f64, Ix1> = persist::load(&path)?;
-    assert_eq!(model, tuned.model);
+    let fitted = tuned.params.fit_uncertain(&data)?.compact();
+    persist::save(&fitted, &path)?;
+    let model: CompactUncertainElm<f64, Ix1> = persist::load(&path)?;
+    assert_eq!(model, fitted);
     println!("saved to and loaded from {}", path.display());
 
-    let uncertain = tuned.params.fit_uncertain(&data)?;
     let new = toy::friedman3(5, 0.1, 2)?;
-    let (low, high) = uncertain.predict_interval(&new.inputs, 0.9)?;
-    let predicted = model.predict(&new.inputs)?;
+    let (low, high) = model.predict_interval(&new.inputs, 0.9)?;
+    let predicted = model.model().predict(&new.inputs)?;
     for row in 0..5 {
         println!(
             "predicted {:.3}, 90 % interval {:.3} to {:.3}, observed {:.3}",
