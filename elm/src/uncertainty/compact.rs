@@ -150,7 +150,8 @@ impl<A: Scalar, D: TargetDim> CompactUncertainElm<A, D> {
     /// leaving out a row changes little, as under ridge, the two are alike; the guarantee is the latter's.
     ///
     /// # Errors
-    /// [`Error::Parameter`] unless `coverage` lies strictly between 0 and 1; those of [`Elm::predict`].
+    /// [`Error::Parameter`] unless `coverage` lies strictly between 0 and 1; [`Error::Overflow`]; those of
+    /// [`Elm::predict`].
     pub fn predict_interval<X: Inputs<A> + ?Sized>(
         &self,
         x: &X,
@@ -172,6 +173,7 @@ impl<A: Scalar, D: TargetDim> CompactUncertainElm<A, D> {
         };
         half *= &self.scores.row(rows - outside);
         half.scaled_add(A::from_f64(EDGES), &self.change_outside(&x));
+        let half = finite(half)?;
         Ok((D::of_matrix(&center - &half), D::of_matrix(center + half)))
     }
 

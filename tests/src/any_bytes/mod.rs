@@ -42,9 +42,11 @@ pub struct Seed {
 }
 
 /// All readers.
-pub const READERS: [Reader; 9] = [
+pub const READERS: [Reader; 11] = [
     networks::MODEL,
     networks::ACCUMULATOR,
+    networks::UNCERTAIN,
+    networks::CLASSIFIER,
     tables::TABLE,
     reflectance::CURET_TABLE,
     reflectance::CURET_VALUES,

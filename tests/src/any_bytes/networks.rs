@@ -1,8 +1,10 @@
-//! Networks and accumulators, as JSON and in binary.
+//! Networks, classifiers and accumulators, as JSON and in binary.
 
+use elm::classify::ElmClassifier;
 use elm::persist::{self, Persist};
 use elm::solve::{PseudoInverse, Ridge};
-use elm::{Accumulator, Activation, Biases, Elm, ElmParams, NeuronGroup, Scalar};
+use elm::uncertainty::CompactUncertainElm;
+use elm::{Accumulator, Activation, Biases, Dataset, Elm, ElmParams, NeuronGroup, Scalar};
 use ndarray::{Array2, Axis};
 
 use super::{Reader, Seed, read};
@@ -17,6 +19,18 @@ pub(super) const ACCUMULATOR: Reader = Reader {
     name: "accumulator",
     seeds: accumulators,
     read: |bytes| any_precision(bytes, use_accumulator::<f64>, use_accumulator::<f32>),
+};
+
+pub(super) const UNCERTAIN: Reader = Reader {
+    name: "uncertain",
+    seeds: uncertain,
+    read: |bytes| any_precision(bytes, use_uncertain::<f64>, use_uncertain::<f32>),
+};
+
+pub(super) const CLASSIFIER: Reader = Reader {
+    name: "classifier",
+    seeds: classifiers,
+    read: |bytes| any_precision(bytes, use_classifier::<f64>, use_classifier::<f32>),
 };
 
 /// Reads as both precisions, and once more with the head of a binary file put right, without
@@ -83,6 +97,36 @@ fn use_model<A: Scalar>(model: &Elm<A>) {
         assert!(
             y.iter().all(|value| value.is_finite()),
             "a prediction that is no number: {y}"
+        );
+    }
+}
+
+fn use_uncertain<A: Scalar>(model: &CompactUncertainElm<A>) {
+    let network = model.model();
+    if network.inputs() > 1 << 12 {
+        return;
+    }
+    let x = rows::<A>(network.inputs());
+    if let Ok(deviation) = model.predict_deviation(&x) {
+        assert_eq!(deviation.dim(), (3, network.outputs()));
+        assert!(deviation.iter().all(|value| value.is_finite()));
+    }
+    if let Ok((low, high)) = model.predict_interval(&x, 0.5) {
+        assert_eq!([low.dim(), high.dim()], [(3, network.outputs()); 2]);
+        assert!(low.iter().chain(&high).all(|value| !value.is_nan()));
+    }
+}
+
+fn use_classifier<A: Scalar>(model: &ElmClassifier<A, u32>) {
+    if model.model().inputs() > 1 << 12 {
+        return;
+    }
+    let x = rows::<A>(model.model().inputs());
+    if let Ok(p) = model.predict_proba(&x) {
+        assert_eq!(p.dim(), (3, model.classes().len()));
+        assert!(
+            p.iter().all(|p| (A::zero()..=A::one()).contains(p)),
+            "probabilities {p}"
         );
     }
 }
@@ -155,6 +199,39 @@ fn models() -> Vec<Seed> {
             name: "bad-half.elm",
             bytes: broken,
         },
+    ]
+}
+
+fn uncertain() -> Vec<Seed> {
+    fn fit<A: Scalar>(members: usize) -> CompactUncertainElm<A> {
+        let (x, t) = data();
+        let data = Dataset::new(&x, &t).expect("rows without a fault");
+        let params = ElmParams::<A>::new(2).with_solver(Ridge::relative(1e-3));
+        let fitted = params.fit_ensemble(members, &data);
+        fitted.expect("rows without a fault").compact()
+    }
+    vec![
+        seed("one.json", true, &fit::<f64>(1)),
+        seed("one.elm", false, &fit::<f64>(1)),
+        seed("two.elm", false, &fit::<f64>(2)),
+        seed("single.elm", false, &fit::<f32>(1)),
+    ]
+}
+
+fn classifiers() -> Vec<Seed> {
+    fn fit<A: Scalar>(classes: u32) -> ElmClassifier<A, u32> {
+        let (x, _) = data::<A>();
+        let labels: Vec<u32> = (0..8).map(|row| row % classes).collect();
+        let params = ElmParams::<A>::new(2);
+        params
+            .fit_classifier(&x, &labels)
+            .expect("rows without a fault")
+    }
+    vec![
+        seed("two.json", true, &fit::<f64>(2)),
+        seed("two.elm", false, &fit::<f64>(2)),
+        seed("three.elm", false, &fit::<f64>(3)),
+        seed("single.elm", false, &fit::<f32>(3)),
     ]
 }
 

@@ -1,0 +1,3 @@
+#![no_main]
+
+elm_fuzz::target!("uncertain");
