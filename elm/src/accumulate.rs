@@ -39,10 +39,13 @@ mod chunks;
 mod forget;
 mod leverage;
 mod likeness;
+mod merge;
 #[cfg(feature = "serde")]
 mod parts;
 mod shift;
 mod spectrum;
+#[cfg(feature = "serde")]
+mod upper;
 
 use std::marker::PhantomData;
 
@@ -103,6 +106,7 @@ pub struct Accumulator<A: Scalar, D: TargetDim = Ix2> {
     /// Whether rows may be unlike those that the scaler was measured on.
     unlike_rows: bool,
     /// The upper triangle, square; columns are the ones (with an intercept), neurons, outputs.
+    #[cfg_attr(feature = "serde", serde(with = "upper"))]
     triangle: Array2<A>,
     /// Powers of two that the triangle's columns were divided by.
     scales: Array1<A>,
@@ -351,45 +355,6 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
                 }
             }
         }
-        Ok(())
-    }
-
-    /// Takes in all that `other` has taken in.
-    ///
-    /// # Errors
-    /// [`Error::Mismatch`] naming what differs: the random layer, the scaler, the outputs, or the
-    /// settings of the solve.
-    pub fn merge(&mut self, other: &Self) -> Result<()> {
-        for (what, same) in [
-            ("random layers", self.map.layer() == other.map.layer()),
-            ("scalers of inputs", self.map.scaler() == other.map.scaler()),
-            ("ramps of inputs", self.map.ramps() == other.map.ramps()),
-            ("numbers of outputs", self.outputs == other.outputs),
-            (
-                "direct links",
-                self.map.direct_links() == other.map.direct_links(),
-            ),
-            ("intercepts", self.intercept == other.intercept),
-            ("solvers", self.solver == other.solver),
-            ("bounds of predictions", self.bounded == other.bounded),
-        ] {
-            if !same {
-                return Err(Error::Mismatch { what });
-            }
-        }
-        let (mut next, mut other) = (self.clone(), other.clone());
-        next.widen_bounds(other.bounds.take());
-        next.flush()?;
-        other.flush()?;
-        let mut rows = &other.triangle * &other.scales;
-        next.take_over(&other, rows.view_mut());
-        next.absorb(&rows)?;
-        next.rows = next.rows.saturating_add(other.rows);
-        next.weighted_rows = next.weighted_rows.saturating_add(other.weighted_rows);
-        for (far, more) in next.far.iter_mut().zip(&other.far) {
-            *far = far.saturating_add(*more);
-        }
-        *self = next;
         Ok(())
     }
 

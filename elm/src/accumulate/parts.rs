@@ -27,6 +27,7 @@ pub(super) struct Parts<A: Scalar> {
     weighted_rows: u64,
     far: Vec<u64>,
     unlike_rows: bool,
+    #[serde(with = "super::upper")]
     triangle: Array2<A>,
     scales: Array1<A>,
     shift: Option<Array1<A>>,

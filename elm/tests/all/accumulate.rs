@@ -2,7 +2,7 @@
 
 use crate::common::{amplification, frobenius, normal, weights};
 use elm::solve::{Inverse, PseudoInverse, Ridge, Solver};
-use elm::{Accumulator, Biases, Dataset, Elm, ElmParams, Error, Scalar, Scaler};
+use elm::{Accumulator, Biases, Dataset, Elm, ElmParams, Error, Scalar, Scaler, persist};
 use ndarray::{Array1, Array2, Axis, array, s};
 
 fn data<A: Scalar>(rows: usize, seed: u64) -> (Array2<A>, Array2<A>) {
@@ -552,4 +552,39 @@ fn a_fit_that_forgets_follows_a_drift_for_ever() {
     let most = once.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let error = (recent - &once).mapv(f64::abs);
     assert!(error.iter().all(|e| *e < 1e-6 * most), "{error}");
+}
+
+#[test]
+fn states_of_few_rows_are_merged_as_if_their_rows_had_been_pushed() {
+    let (x, t) = data::<f64>(300, 5);
+    let scaler = Scaler::measured(&x).unwrap();
+    let none = Accumulator::with_scaler(&ElmParams::new(20), scaler, 2).unwrap();
+    let (mut pushed, mut merged) = (none.clone(), none.clone());
+    for start in (0..300).step_by(10) {
+        let range = s![start..start + 10, ..];
+        let mut group = none.clone();
+        group.push(&x.slice(range), &t.slice(range)).unwrap();
+        merged.merge(&group).unwrap();
+        pushed.push(&x.slice(range), &t.slice(range)).unwrap();
+    }
+    assert_eq!(merged, pushed);
+}
+
+#[test]
+fn a_compact_accumulator_has_the_same_fit_and_a_small_file() {
+    let (x, t) = data::<f64>(300, 5);
+    let scaler = Scaler::measured(&x).unwrap();
+    let mut rows = Accumulator::with_scaler(&ElmParams::new(100), scaler, 2).unwrap();
+    rows.push(&x, &t).unwrap();
+    let (fit, bytes) = (rows.fit().unwrap(), persist::to_bytes(&rows).unwrap());
+    rows.compact().unwrap();
+    let small = persist::to_bytes(&rows).unwrap();
+    // The triangle of 103 columns, and what describes the layer.
+    assert!(small.len() < 8 * (103 * 104 / 2) + 8_000, "{}", small.len());
+    assert!(bytes.len() > 4 * small.len());
+    let again: Accumulator<f64> = persist::from_bytes(&small).unwrap();
+    assert_eq!(again, rows);
+    assert_eq!(again.fit().unwrap(), fit);
+    rows.push(&x, &t).unwrap();
+    assert_eq!(rows.rows(), 600);
 }

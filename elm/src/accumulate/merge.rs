@@ -1,0 +1,84 @@
+//! What carries rows from one accumulator to another: merging, and a compact form.
+
+use super::Accumulator;
+use crate::dataset::TargetDim;
+use crate::error::{Error, Result};
+use crate::scalar::Scalar;
+
+impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
+    /// Takes in all that `other` has taken in: as rows where it has not factorized any yet, which costs no
+    /// factorization here either, else its triangle.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] naming what differs: the random layer, the scaler, the outputs, or the
+    /// settings of the solve.
+    pub fn merge(&mut self, other: &Self) -> Result<()> {
+        for (what, same) in [
+            ("random layers", self.map.layer() == other.map.layer()),
+            ("scalers of inputs", self.map.scaler() == other.map.scaler()),
+            ("ramps of inputs", self.map.ramps() == other.map.ramps()),
+            ("numbers of outputs", self.outputs == other.outputs),
+            (
+                "direct links",
+                self.map.direct_links() == other.map.direct_links(),
+            ),
+            ("intercepts", self.intercept == other.intercept),
+            ("solvers", self.solver == other.solver),
+            ("bounds of predictions", self.bounded == other.bounded),
+        ] {
+            if !same {
+                return Err(Error::Mismatch { what });
+            }
+        }
+        let mut next = self.clone();
+        next.widen_bounds(other.bounds.clone());
+        if other.has_triangle() {
+            let mut other = other.clone();
+            next.flush()?;
+            other.flush()?;
+            let mut rows = &other.triangle * &other.scales;
+            next.take_over(&other, rows.view_mut());
+            next.absorb(&rows)?;
+        } else {
+            next.take_pending(&other.pending)?;
+        }
+        next.rows = next.rows.saturating_add(other.rows);
+        next.weighted_rows = next.weighted_rows.saturating_add(other.weighted_rows);
+        for (far, more) in next.far.iter_mut().zip(&other.far) {
+            *far = far.saturating_add(*more);
+        }
+        *self = next;
+        Ok(())
+    }
+
+    /// Whether rows have entered the triangle.
+    fn has_triangle(&self) -> bool {
+        self.triangle.iter().any(|value| *value != A::zero())
+    }
+
+    /// Takes in rows that another has not factorized either.
+    fn take_pending(&mut self, rows: &[A]) -> Result<()> {
+        let block = self.block() * self.columns();
+        for row in rows.chunks_exact(self.columns()) {
+            self.pending.extend(row);
+            if self.pending.len() == block {
+                self.flush()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Lets all rows enter the triangle, of which a file then holds little more: half the square of neurons
+    /// and outputs in numbers, where rows that wait to be factorized together are several times as many.
+    /// Costs a factorization. A state of few rows, fewer than neurons, is smaller without it.
+    ///
+    /// # Errors
+    /// [`Error::Overflow`] for values beyond the range; nothing has changed then.
+    pub fn compact(&mut self) -> Result<()> {
+        let mut next = self.clone();
+        next.flush()?;
+        next.pending = Vec::new();
+        *self = next;
+        Ok(())
+    }
+}
