@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 /// Work that a renderer may leave out; each can be switched off.
 ///
-/// Those of [`LOSSLESS`](Self::LOSSLESS) leave the picture the same bit for bit; the others stay within a bound.
+/// Those of [`LOSSLESS`](Self::LOSSLESS) leave the picture the same bit for bit; the others stay within a
+/// bound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Optimizations {
     /// Load and train only materials that some ray meets, when it first does.

@@ -31,7 +31,7 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
     ///     // A slope that grows day by day.
     ///     recent.push(&x, &(&x * day as f64))?;
     /// }
-    /// let slope = recent.fit()?.predict(&array![[1.0]])?[[0, 0]];
+    /// let slope = recent.fit()?.predict(&array![[0.5]])?[[0, 0]] / 0.5;
     /// // The weighted mean of 19, 18, 17 and so on, each of half the weight of the one before.
     /// assert!((slope - 18.0).abs() < 0.1);
     /// # Ok::<(), elm::Error>(())
