@@ -486,10 +486,9 @@ fn a_damaged_accumulator_is_not_read() {
             "/scales",
             serde_json::json!({"v": 1, "dim": [7], "data": vec![0.0; 7]}),
         ),
-        (
-            "/triangle",
-            serde_json::json!({"v": 1, "dim": [7, 6], "data": vec![0.0; 42]}),
-        ),
+        // Of six columns, not of seven; and no triangle.
+        ("/triangle", serde_json::json!(vec![0.0; 21])),
+        ("/triangle", serde_json::json!(vec![0.0; 27])),
         (
             "/solver",
             serde_json::json!({"ridge": {"lambda": {"relative": -1.0}, "shared": false}}),
@@ -501,7 +500,7 @@ fn a_damaged_accumulator_is_not_read() {
     }
     // A triangle of zeros is well formed, and has no mean.
     let mut empty = whole;
-    empty["triangle"] = serde_json::json!({"v": 1, "dim": [7, 7], "data": vec![0.0; 49]});
+    empty["triangle"] = serde_json::json!(vec![0.0; 28]);
     empty["pending"] = serde_json::json!([]);
     let empty: Accumulator<f64> = serde_json::from_value(empty).unwrap();
     assert!(matches!(empty.fit(), Err(Error::Overflow { .. })));
