@@ -35,12 +35,13 @@ impl TryFrom<Parts> for Calibration {
     type Error = Error;
 
     fn try_from(parts: Parts) -> Result<Self> {
-        let finite = parts.slope.is_finite() && parts.shifts.iter().all(|b| b.is_finite());
-        if !finite || parts.slope < 0.0 {
+        let in_range = |b: &f64| (-CERTAIN..=CERTAIN).contains(b);
+        let all = parts.shifts.iter().all(in_range);
+        if !all || !(0.0..=CERTAIN).contains(&parts.slope) {
             return Err(Error::Parameter {
                 name: "slope or shift of a calibration",
                 value: parts.slope,
-                expected: "finite and not negative",
+                expected: "from 0 to 1e30, shifts from -1e30",
             });
         }
         Ok(Self {
@@ -50,6 +51,9 @@ impl TryFrom<Parts> for Calibration {
     }
 }
 
+/// Scores, slopes, shifts and log-odds of this size say that a class is certain. None is taken for larger, so
+/// that no product or difference leaves the range of a type.
+const CERTAIN: f64 = 1e30;
 /// Newton's steps at most; the function is convex, and ten are usual.
 const STEPS: usize = 50;
 /// Twice what the loss may fall by, from where on whole steps converge: too little for values of the loss to
@@ -104,14 +108,28 @@ impl Calibration {
     /// $a f + b$ in place of scores; of two classes the difference between them.
     pub(super) fn apply<A: Scalar>(&self, scores: &mut Array2<A>) {
         if scores.ncols() == 1 && self.shifts.len() == 2 {
-            let shift = self.shifts[1] - self.shifts[0];
-            scores.mapv_inplace(|f| A::from_f64(self.slope * (2.0 * f.as_f64() - 1.0) + shift));
+            scores.mapv_inplace(|f| A::from_f64(self.of_second(f.as_f64())));
             return;
         }
-        for (mut column, &shift) in scores.columns_mut().into_iter().zip(&self.shifts) {
-            column.mapv_inplace(|f| A::from_f64(self.slope * f.as_f64() + shift));
+        for (class, mut column) in scores.columns_mut().into_iter().enumerate() {
+            column.mapv_inplace(|f| A::from_f64(self.of_class(class, f.as_f64())));
         }
     }
+
+    /// The log-odds of a class with this score, up to a number common to all classes.
+    pub(super) fn of_class(&self, class: usize, score: f64) -> f64 {
+        held(self.slope * held(score) + self.shifts[class])
+    }
+
+    /// The log-odds of the second of two classes, whose score this is, against the first.
+    pub(super) fn of_second(&self, score: f64) -> f64 {
+        let shift = self.shifts[1] - self.shifts[0];
+        held(self.slope * (2.0 * held(score) - 1.0) + shift)
+    }
+}
+
+fn held(value: f64) -> f64 {
+    value.clamp(-CERTAIN, CERTAIN)
 }
 
 /// A column for each class.

@@ -137,16 +137,15 @@ impl<A: Scalar> ClassPredictor<A> {
 
     /// In place of scores, which stand in the first columns.
     fn probabilities(&self, out: &mut ArrayRef2<A>) {
-        let (slope, shifts) = (self.calibration.slope(), self.calibration.shifts());
         for mut row in out.rows_mut() {
             if self.classes == 2 {
-                let z = slope * (2.0 * row[0].as_f64() - 1.0) + shifts[1] - shifts[0];
+                let z = self.calibration.of_second(row[0].as_f64());
                 let (first, second) = both_classes(z);
                 (row[0], row[1]) = (A::from_f64(first), A::from_f64(second));
                 continue;
             }
-            for (z, &shift) in row.iter_mut().zip(shifts) {
-                *z = A::from_f64(slope * z.as_f64() + shift);
+            for (class, z) in row.iter_mut().enumerate() {
+                *z = A::from_f64(self.calibration.of_class(class, z.as_f64()));
             }
             softmax(&mut row);
         }

@@ -1,11 +1,15 @@
 //! The posterior of ridge's output weights, as far as the variance of predictions needs it: the factor of a
 //! problem without its rows.
 
-use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, Axis, Zip};
+#[cfg(feature = "serde")]
+use ndarray::Axis;
+use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, Zip};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
+#[cfg(feature = "serde")]
 use crate::check::{check_finite, check_length};
+#[cfg(feature = "serde")]
 use crate::error::Result;
 use crate::scalar::Scalar;
 use crate::solve::design_svd::DesignSvd;
@@ -39,6 +43,7 @@ impl<A: Scalar> Posterior<A> {
     }
 
     /// Whether it is of a layer of so many columns.
+    #[cfg(feature = "serde")]
     pub(crate) fn check(&self, columns: usize) -> Result<()> {
         check_length("columns of a posterior", self.mean.len(), columns)?;
         check_length("singular vectors", self.vt.ncols(), columns)?;

@@ -4,6 +4,7 @@ use ndarray::{Array, Array1, Array2, ArrayRef2, Axis, Ix2, Zip};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
+#[cfg(feature = "serde")]
 use crate::check::{check_finite, check_length};
 use crate::cross_validation::Posterior;
 use crate::dataset::{Inputs, TargetDim};
