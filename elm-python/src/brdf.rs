@@ -150,11 +150,17 @@ impl Brdf {
         let pairs = pairs(&wi, &wo)?;
         let densities: Array1<f64> = py.detach(|| -> PyResult<_> {
             let mixture = self.mixture()?;
-            let density = |pair: &DirectionPair| match is_above(pair.outgoing) {
-                true => mixture.density(pair.outgoing, pair.incident),
-                false => 0.0,
-            };
-            Ok(pairs.iter().map(density).collect())
+            let density = |pair: &DirectionPair| mixture.density(pair.outgoing, pair.incident);
+            let densities = pairs.iter();
+            Ok(densities
+                .map(|pair| {
+                    if is_above(pair.outgoing) {
+                        density(pair)
+                    } else {
+                        0.0
+                    }
+                })
+                .collect())
         })?;
         Ok(densities.into_pyarray(py))
     }

@@ -20,4 +20,10 @@ mod _elm_learn {
     use crate::regressor::{Network, Rows};
     #[pymodule_export]
     use crate::settings::Settings;
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn constants(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("SEARCH_ROWS", elm::ElmParams::<f64>::auto().search_rows())
+    }
 }

@@ -103,7 +103,7 @@ fn run(arguments: &Arguments) -> Result<Option<String>, String> {
     }
     let sized: Vec<_> = tables.iter().map(|t| (t.name.clone(), t.size())).collect();
     let command = "cargo run --release -p elm-benches --bin tables -- --data DIR";
-    let page = figures.page(&sized, arguments.splits, command, "");
+    let page = figures.page(&sized, arguments.splits, command);
     match &arguments.out {
         None => Ok(Some(page)),
         Some(path) => std::fs::write(path, page)

@@ -60,13 +60,13 @@ impl Figures {
 
     /// The page.
     #[must_use]
-    pub fn page(&self, tables: &[SizedTable], splits: u64, command: &str, about: &str) -> String {
+    pub fn page(&self, tables: &[SizedTable], splits: u64, command: &str) -> String {
         let mut page = format!(
             "# Real tables\n\n    {command} --splits {splits}\n\nTest RMSE over the standard deviation of the test \
              targets, mean of {splits} splits of three quarters of the rows, 5,000 at most, and the \
              rest. `auto` is `ElmParams::auto()`, `full` its full level; the others are \
              scikit-learn's, settings chosen on a quarter of the training rows \
-             (`benches/peers/tables.py`).{about} In brackets the seconds of processor time, one \
+             (`benches/peers/tables.py`). In brackets the seconds of processor time, one \
              thread each.\n\n| table | rows x inputs |"
         );
         let methods: Vec<&str> = OURS.into_iter().chain(METHODS).collect();

@@ -11,12 +11,10 @@ from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
 
-from ._elm_learn import Settings
+from ._elm_learn import SEARCH_ROWS, Settings
 
 #: Neurons of ``partial_fit`` where their number is to be chosen.
 PARTIAL_NEURONS = 200
-#: Rows that a search of settings looks at, at most.
-SEARCH_ROWS = 2000
 #: Multiply-adds from which a fit runs where Ctrl-C can end the wait for it.
 LONG = 2e9
 FLOATS = (np.float64, np.float32)

@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64] | NDArray[np.float32]
 
+#: Rows that a search of settings looks at, at most.
+SEARCH_ROWS: int
+
 class Settings:
     def __new__(
         cls,

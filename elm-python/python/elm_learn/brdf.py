@@ -24,6 +24,12 @@ def _directions(name, w):
     return w
 
 
+def _pairs(wi, wo):
+    """Both directions broadcast against each other, shapes (n, 3), and the shape of the pairs."""
+    wi, wo = np.broadcast_arrays(_directions("wi", wi), _directions("wo", wo))
+    return wi.reshape(-1, 3), wo.reshape(-1, 3), wi.shape[:-1]
+
+
 class Brdf:
     """A reflectance model; made by :func:`load` and :func:`fit`."""
 
@@ -43,9 +49,8 @@ class Brdf:
         values : ndarray of shape (..., channels)
             In 1/sr; 0 below the horizon.
         """
-        wi, wo = np.broadcast_arrays(_directions("wi", wi), _directions("wo", wo))
-        shape = wi.shape[:-1]
-        values = self._model.eval(wi.reshape(-1, 3), wo.reshape(-1, 3))
+        wi, wo, shape = _pairs(wi, wo)
+        values = self._model.eval(wi, wo)
         return values.reshape(*shape, -1)
 
     def sample(self, wo, u):
@@ -85,9 +90,8 @@ class Brdf:
         ndarray of shape (...)
             In 1/sr.
         """
-        wi, wo = np.broadcast_arrays(_directions("wi", wi), _directions("wo", wo))
-        pdf = self._model.pdf(wi.reshape(-1, 3), wo.reshape(-1, 3))
-        return pdf.reshape(wi.shape[:-1])
+        wi, wo, shape = _pairs(wi, wo)
+        return self._model.pdf(wi, wo).reshape(shape)
 
     def save(self, path):
         """Write a file that ``elm-brdf`` and :func:`load` read; JSON where the name ends in ``.json``."""

@@ -50,11 +50,26 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
         let root = A::from_f64(factor.sqrt());
         self.triangle *= root;
         self.pending.iter_mut().for_each(|value| *value *= root);
+        self.drop_weightless_rows();
         let shrunk = |rows: u64| rows as f64 * factor;
         self.weighted_rows = shrunk(self.weighted_rows).ceil() as u64;
         for far in &mut self.far {
             *far = shrunk(*far) as u64;
         }
         Ok(())
+    }
+
+    /// Drops pending rows whose weight has vanished, of which no means could be taken.
+    fn drop_weightless_rows(&mut self) {
+        let columns = self.columns();
+        // With an intercept the first column is the root of the weight.
+        let weighty = |row: &&[A]| match self.intercept {
+            true => row[0] > A::zero(),
+            false => row.iter().any(|value| *value != A::zero()),
+        };
+        if !self.pending.chunks_exact(columns).all(|row| weighty(&row)) {
+            let rows = self.pending.chunks_exact(columns).filter(weighty);
+            self.pending = rows.flatten().copied().collect();
+        }
     }
 }

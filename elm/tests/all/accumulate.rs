@@ -533,6 +533,43 @@ fn what_is_forgotten_weighs_as_much_as_in_a_weighted_batch() {
 }
 
 #[test]
+fn after_all_is_forgotten_an_accumulator_is_as_good_as_new() {
+    let (x, t) = data::<f64>(40, 7);
+    let (other, targets) = data::<f64>(40, 8);
+    let other = other.mapv(|x| 100.0 * x);
+    for intercept in [true, false] {
+        let params = ElmParams::new(10)
+            .with_solver(Ridge::relative(1e-6))
+            .with_intercept(intercept);
+        let scaler = Scaler::measured(&x).unwrap();
+        let new = Accumulator::with_scaler(&params, scaler, 2).unwrap();
+        let new = new.with_unlike_rows(true);
+        let mut fresh = new.clone();
+        fresh.push(&x, &t).unwrap();
+        // Rows that still wait, those of weights that vanish by and by, and rows in the triangle.
+        for (factor, times) in [(0.0, 1), (1e-200, 5)] {
+            for compact in [false, true] {
+                let mut used = new.clone();
+                used.push(&other, &targets).unwrap();
+                for _ in 0..times {
+                    used.forget(factor).unwrap();
+                }
+                if compact {
+                    used.compact().unwrap();
+                }
+                used.push(&x, &t).unwrap();
+                let fitted = used.fit().unwrap();
+                assert!(fitted.beta().iter().all(|value| value.is_finite()));
+                let difference = fitted.beta().to_owned() - fresh.fit().unwrap().beta();
+                let largest = difference.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
+                let size = fitted.beta().iter().fold(0.0_f64, |m, b| m.max(b.abs()));
+                assert!(largest <= 1e-9 * size, "{largest} of {size}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_fit_that_forgets_follows_a_drift_for_ever() {
     let (x, _) = data::<f64>(60, 5);
     let scaler = Scaler::measured(&x).unwrap();
