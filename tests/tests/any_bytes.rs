@@ -62,6 +62,34 @@ fn seeds_are_read_as_their_names_say() {
     }
 }
 
+#[test]
+fn no_place_of_a_file_may_hold_what_is_no_number() {
+    let _alone = alone();
+    let values: [&[u8]; 5] = [
+        &f64::NAN.to_le_bytes(),
+        &f64::INFINITY.to_le_bytes(),
+        &f64::MAX.to_le_bytes(),
+        &f32::NAN.to_le_bytes(),
+        &f32::NEG_INFINITY.to_le_bytes(),
+    ];
+    // Longer seeds are texts and tables, whose numbers are much like one another.
+    for reader in READERS {
+        for seed in (reader.seeds)()
+            .into_iter()
+            .filter(|seed| seed.bytes.len() < 2000)
+        {
+            for (place, value) in
+                (0..seed.bytes.len()).flat_map(|place| values.map(|value| (place, value)))
+            {
+                let mut bytes = seed.bytes.clone();
+                let end = bytes.len().min(place + value.len());
+                bytes[place..end].copy_from_slice(&value[..end - place]);
+                reader.check(&bytes);
+            }
+        }
+    }
+}
+
 /// What readers are known to trip over.
 const PIECES: [&[u8]; 18] = [
     b"",

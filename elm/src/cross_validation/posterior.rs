@@ -1,9 +1,9 @@
 //! The posterior of ridge's output weights, as far as the variance of predictions needs it: the factor of a
 //! problem without its rows.
 
-#[cfg(feature = "serde")]
-use ndarray::Axis;
 use ndarray::{Array1, Array2, ArrayRef1, ArrayRef2, ArrayView1, Zip};
+#[cfg(feature = "serde")]
+use ndarray::{Axis, aview2};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
@@ -50,7 +50,11 @@ impl<A: Scalar> Posterior<A> {
         check_length("singular values", self.s.len(), self.vt.nrows())?;
         check_finite("singular vectors", self.vt.view())?;
         check_finite("singular values", self.s.view().insert_axis(Axis(0)))?;
-        check_finite("means", self.mean.view().insert_axis(Axis(0)))
+        check_finite("means", self.mean.view().insert_axis(Axis(0)))?;
+        check_finite(
+            "scale and intercept",
+            aview2(&[[self.scale, self.constant]]),
+        )
     }
 
     /// $1/n + \tilde h^T (\tilde H^T \tilde H + \lambda)^{-1} \tilde h$ for each new hidden row and each

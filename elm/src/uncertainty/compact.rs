@@ -1,5 +1,7 @@
 //! A network with its uncertainty and without the training rows, which fits in a file.
 
+#[cfg(feature = "serde")]
+use ndarray::aview2;
 use ndarray::{Array, Array1, Array2, ArrayRef2, Axis, Ix2, Zip};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -110,6 +112,7 @@ impl<A: Scalar, D: TargetDim> TryFrom<Parts<A, D>> for CompactUncertainElm<A, D>
         check_finite("scores", parts.scores.view())?;
         check_finite("slopes", parts.steepness.view())?;
         check_finite("deviations", parts.noise.view().insert_axis(Axis(0)))?;
+        check_finite("mean weight", aview2(&[[parts.mean_weight]]))?;
         Ok(Self {
             model: parts.model,
             members: parts.members,
