@@ -3,7 +3,7 @@
 
 use std::hint::black_box;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group};
 use elm::{Accuracy, Activation, Scalar};
 use elm_benches::networks::{network, rows};
 use ndarray::Array2;
@@ -38,4 +38,8 @@ fn each<A: Scalar>(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, activation);
-criterion_main!(benches);
+fn main() {
+    elm_benches::timing::use_threads(1);
+    benches();
+    Criterion::default().configure_from_args().final_summary();
+}

@@ -3,9 +3,7 @@
 use std::hint::black_box;
 
 use criterion::measurement::WallTime;
-use criterion::{
-    BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main,
-};
+use criterion::{BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group};
 use elm::{Activation, Scalar};
 use elm_benches::networks::{network, rows};
 use ndarray::Array2;
@@ -62,4 +60,8 @@ fn size<A: Scalar>(
 }
 
 criterion_group!(benches, predict);
-criterion_main!(benches);
+fn main() {
+    elm_benches::timing::use_threads(1);
+    benches();
+    Criterion::default().configure_from_args().final_summary();
+}

@@ -3,7 +3,7 @@
 
 use std::hint::black_box;
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group};
 use elm_brdf::fit::Fit;
 use elm_brdf::model::{BrdfModel, BrdfParams, GlobalScaling};
 use elm_brdf::protocol::{Folds, cross_validate};
@@ -74,4 +74,8 @@ fn reproduce(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, reproduce);
-criterion_main!(benches);
+fn main() {
+    elm_benches::timing::use_threads(1);
+    benches();
+    Criterion::default().configure_from_args().final_summary();
+}

@@ -2,7 +2,7 @@
 
 mod common;
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group};
 use elm_benches::topics::Topic;
 
 fn validate(criterion: &mut Criterion) {
@@ -10,4 +10,8 @@ fn validate(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, validate);
-criterion_main!(benches);
+fn main() {
+    elm_benches::timing::use_threads(1);
+    benches();
+    Criterion::default().configure_from_args().final_summary();
+}

@@ -1,6 +1,26 @@
-//! Repeated timing by the wall clock.
+//! Repeated timing, on as many threads as are asked for.
 
+use std::sync::{LazyLock, OnceLock};
 use std::time::Instant;
+
+static THREADS: OnceLock<usize> = OnceLock::new();
+
+/// Keeps whatever the library does to this number of threads; before anything else.
+pub fn use_threads(threads: usize) {
+    // The second of two calls is without effect.
+    drop(
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global(),
+    );
+    THREADS.get_or_init(|| threads);
+}
+
+/// The number of threads that measurements are made on.
+#[must_use]
+pub fn threads() -> usize {
+    THREADS.get().copied().unwrap_or(1)
+}
 
 /// The fastest of `repetitions` timings of `work`, in seconds per call: what the machine can do,
 /// to which other processes only add.
@@ -24,21 +44,17 @@ pub fn fastest_seconds(repetitions: usize, mut work: impl FnMut()) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Processor time that this process has used, in seconds; where the system does not say, the time
-/// on the clock.
+/// Processor time that this process has used, in seconds; where the system does not say, and on several threads,
+/// the time on the clock.
 #[must_use]
 pub fn processor_seconds() -> f64 {
     #[cfg(unix)]
-    {
+    if threads() == 1 {
         let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-        time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+        return time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9;
     }
-    #[cfg(not(unix))]
-    {
-        use std::sync::LazyLock;
-        static START: LazyLock<Instant> = LazyLock::new(Instant::now);
-        START.elapsed().as_secs_f64()
-    }
+    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+    START.elapsed().as_secs_f64()
 }
 
 /// Processor time of a call, of as many as take `least_seconds` together.

@@ -263,22 +263,18 @@ impl MaterialLoader<MaterialTable> for SceneMaterialLoader {
         let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
         let made = match &*slot {
             Some(made) => made.clone(),
-            None => slot.insert(self.make(table, dir)?).clone(),
+            None => slot.insert(apart(|| self.make(table, dir))?).clone(),
         };
         if !table.rotation.is_finite() {
             let found = table.rotation;
             return Err(Error::Rotation { found }.into());
         }
-        let brdf: Box<dyn Brdf> = if made.brdf.is_isotropic() || table.rotation == 0.0 {
-            Box::new(made.brdf)
-        } else {
-            Box::new(Turned {
-                brdf: made.brdf,
-                angle: -table.rotation.to_radians(),
-            })
-        };
+        let turns = !made.brdf.is_isotropic() && table.rotation != 0.0;
         Ok(LoadedMaterial {
-            brdf,
+            brdf: Box::new(InScene {
+                brdf: made.brdf,
+                angle: turns.then(|| -table.rotation.to_radians()),
+            }),
             multiply_adds: made.multiply_adds,
             tint: table.tint.unwrap_or([1.0; 3]),
             conserve_energy: table.conserve_energy,
@@ -289,14 +285,25 @@ impl MaterialLoader<MaterialTable> for SceneMaterialLoader {
     }
 }
 
-/// A model that is asked for pairs turned about the normal.
-struct Turned {
-    brdf: Arc<dyn Brdf>,
-    /// In radians.
-    angle: f64,
+/// Makes a material on a thread of its own, and as many below it as there are here.
+///
+/// A worker of the renderer asks for it, and holds locks. Waiting for other threads the library's way it would
+/// take up another tile meanwhile, which may wait for these very locks.
+fn apart(make: impl FnOnce() -> Result<Made> + Send) -> Result<Made> {
+    let threads = elm::current_threads();
+    let work = || elm::on_threads(threads, make)?;
+    let joined = std::thread::scope(|scope| scope.spawn(work).join());
+    joined.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
 
-impl Brdf for Turned {
+/// A model that is asked for pairs turned about the normal, and answers on the worker that asks.
+struct InScene {
+    brdf: Arc<dyn Brdf>,
+    /// In radians, where it is turned.
+    angle: Option<f64>,
+}
+
+impl Brdf for InScene {
     fn channels(&self) -> usize {
         self.brdf.channels()
     }
@@ -310,8 +317,10 @@ impl Brdf for Turned {
         pairs: &[DirectionPair],
         values: ArrayViewMut2<'_, f64>,
     ) -> Result<(), EvalError> {
-        let turned: Vec<DirectionPair> = pairs.iter().map(|p| p.turned(self.angle)).collect();
-        self.brdf.eval_into(&turned, values)
+        let turned = |angle| pairs.iter().map(move |pair| pair.turned(angle)).collect();
+        let turned: Option<Vec<DirectionPair>> = self.angle.map(turned);
+        let pairs = turned.as_deref().unwrap_or(pairs);
+        elm::on_this_thread(|| self.brdf.eval_into(pairs, values))
     }
 }
 

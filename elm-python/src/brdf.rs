@@ -11,6 +11,7 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::pool::on_threads;
 use crate::settings::error;
 
 /// A fitted reflectance model.
@@ -71,7 +72,7 @@ fn pairs(
 impl Brdf {
     #[staticmethod]
     fn load(py: Python<'_>, path: std::path::PathBuf) -> PyResult<Self> {
-        py.detach(|| BrdfModel::load(path))
+        on_threads(py, 1, || BrdfModel::load(path))?
             .map(Self::of)
             .map_err(error)
     }
@@ -91,7 +92,7 @@ impl Brdf {
             neurons,
             ..Tuned::default()
         };
-        py.detach(|| tuned.fit_model(&pairs, values))
+        on_threads(py, 1, || tuned.fit_model(&pairs, values))?
             .map(Self::of)
             .map_err(error)
     }
@@ -104,7 +105,7 @@ impl Brdf {
         wo: PyReadonlyArray2<'_, f64>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let pairs = pairs(&wi, &wo)?;
-        let values = py.detach(|| self.model.eval(&pairs)).map_err(error)?;
+        let values = on_threads(py, 1, || self.model.eval(&pairs))?.map_err(error)?;
         Ok(values.into_pyarray(py))
     }
 
@@ -123,7 +124,7 @@ impl Brdf {
                 u.shape()
             )));
         }
-        let (directions, densities) = py.detach(|| -> PyResult<_> {
+        let (directions, densities) = on_threads(py, 1, || -> PyResult<_> {
             let mixture = self.mixture()?;
             let mut directions = Array2::zeros((wo.nrows(), 3));
             let mut densities = Array1::zeros(wo.nrows());
@@ -136,7 +137,7 @@ impl Brdf {
                 densities[row] = if is_above(wo) { density } else { 0.0 };
             }
             Ok((directions, densities))
-        })?;
+        })??;
         Ok((directions.into_pyarray(py), densities.into_pyarray(py)))
     }
 
@@ -148,7 +149,7 @@ impl Brdf {
         wo: PyReadonlyArray2<'_, f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let pairs = pairs(&wi, &wo)?;
-        let densities: Array1<f64> = py.detach(|| -> PyResult<_> {
+        let densities: Array1<f64> = on_threads(py, 1, || -> PyResult<_> {
             let mixture = self.mixture()?;
             let density = |pair: &DirectionPair| mixture.density(pair.outgoing, pair.incident);
             let densities = pairs.iter();
@@ -161,7 +162,7 @@ impl Brdf {
                     }
                 })
                 .collect())
-        })?;
+        })??;
         Ok(densities.into_pyarray(py))
     }
 

@@ -9,7 +9,7 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::pool::pool;
+use crate::pool::on_threads;
 use crate::regressor::precision;
 use crate::scalars::{Either, either, on_rows};
 use crate::settings::{Recipe, Settings, error};
@@ -33,15 +33,8 @@ impl<A: Scalar> Packed<A> {
         self.predictor.get_or_init(|| self.model.predictor())
     }
 
-    fn probabilities(&self, x: ArrayView2<'_, A>, threads: usize) -> PyResult<Array2<A>> {
-        let predictor = self.predictor();
-        let Some(pool) = pool(threads)? else {
-            return predictor.predict_proba(&x).map_err(error);
-        };
-        let mut out = Array2::zeros((x.nrows(), predictor.classes()));
-        pool.install(|| predictor.predict_proba_into_parallel(&x, &mut out))
-            .map_err(error)?;
-        Ok(out)
+    fn probabilities(&self, x: ArrayView2<'_, A>) -> PyResult<Array2<A>> {
+        self.predictor().predict_proba(&x).map_err(error)
     }
 
     fn decisions(&self, x: ArrayView2<'_, A>) -> PyResult<Array2<A>> {
@@ -131,7 +124,9 @@ impl Classifier {
                 balanced,
             };
             let x = x.as_array();
-            Kind::F64(py.detach(|| fit(settings, x, &labels, classes, weights))?)
+            Kind::F64(on_threads(py, settings.threads, || {
+                fit(settings, x, &labels, classes, weights)
+            })??)
         } else {
             let x = x.extract::<PyReadonlyArray2<'_, f32>>()?;
             let w: Option<PyReadonlyArray1<'_, f32>> = weights.map(|w| w.extract()).transpose()?;
@@ -141,7 +136,9 @@ impl Classifier {
                 balanced,
             };
             let x = x.as_array();
-            Kind::F32(py.detach(|| fit(settings, x, &labels, classes, weights))?)
+            Kind::F32(on_threads(py, settings.threads, || {
+                fit(settings, x, &labels, classes, weights)
+            })??)
         };
         Ok(Self { kind })
     }
@@ -152,7 +149,7 @@ impl Classifier {
         x: &Bound<'py, PyAny>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        either!(&self.kind, model => on_rows(py, x, |x| model.probabilities(x, threads)))
+        either!(&self.kind, model => on_rows(py, x, threads, |x| model.probabilities(x)))
     }
 
     fn decision_function<'py>(
@@ -160,7 +157,7 @@ impl Classifier {
         py: Python<'py>,
         x: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        either!(&self.kind, model => on_rows(py, x, |x| model.decisions(x)))
+        either!(&self.kind, model => on_rows(py, x, 1, |x| model.decisions(x)))
     }
 
     /// Leave-one-out RMSE of the 0 and 1 of each class, where the solver knows it.
@@ -214,6 +211,7 @@ impl Classifier {
 #[pyclass(module = "elm_learn._elm_learn")]
 pub(crate) struct ClassRows {
     rows: ClassAccumulator<f64, u32>,
+    threads: usize,
 }
 
 #[pymethods]
@@ -225,6 +223,7 @@ impl ClassRows {
         let rows = ClassAccumulator::from_sample(&params, &sample.as_array(), &all);
         Ok(Self {
             rows: rows.map_err(error)?.with_unlike_rows(true),
+            threads: settings.threads,
         })
     }
 
@@ -245,12 +244,12 @@ impl ClassRows {
             balanced: false,
         };
         let (x, rows) = (x.as_array(), &mut self.rows);
-        py.detach(|| rows.push_labeled(&labeled(&x, &labels, classes, weights)?))
-            .map_err(error)
+        let push = || rows.push_labeled(&labeled(&x, &labels, classes, weights)?);
+        on_threads(py, self.threads, push)?.map_err(error)
     }
 
     fn fit(&self, py: Python<'_>) -> PyResult<Classifier> {
-        let model = py.detach(|| self.rows.fit()).map_err(error)?;
+        let model = on_threads(py, self.threads, || self.rows.fit())?.map_err(error)?;
         Ok(Classifier {
             kind: Kind::F64(Packed::of(model)),
         })
@@ -266,6 +265,6 @@ impl ClassRows {
     #[staticmethod]
     fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
         let rows = persist::from_bytes(bytes).map_err(error)?;
-        Ok(Self { rows })
+        Ok(Self { rows, threads: 1 })
     }
 }

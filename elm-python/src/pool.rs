@@ -1,18 +1,35 @@
-//! Threads of predictions.
+//! Threads of fits and predictions.
 
 use std::collections::HashMap;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
-use pyo3::PyResult;
 use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::settings::error;
 
 /// By process, as threads do not outlive a fork, and number of threads.
 static POOLS: LazyLock<Mutex<HashMap<(u32, usize), Arc<ThreadPool>>>> =
     LazyLock::new(Mutex::default);
 
+/// What `work` gives on this number of threads, the interpreter's lock released meanwhile.
+///
+/// Never on a pool of the whole process: its threads would be missing in a forked one.
+pub(crate) fn on_threads<R: Send>(
+    py: Python<'_>,
+    threads: usize,
+    work: impl FnOnce() -> R + Send,
+) -> PyResult<R> {
+    let pool = pool(threads)?;
+    py.detach(|| match pool {
+        Some(pool) => Ok(pool.install(work)),
+        None => elm::on_threads(1, work).map_err(error),
+    })
+}
+
 /// A pool of this many threads; nothing for one, which is the caller's own.
-pub(crate) fn pool(threads: usize) -> PyResult<Option<Arc<ThreadPool>>> {
+fn pool(threads: usize) -> PyResult<Option<Arc<ThreadPool>>> {
     if threads < 2 {
         return Ok(None);
     }

@@ -11,7 +11,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::pool::pool;
+use crate::pool::on_threads;
 use crate::scalars::{Either, either, on_rows};
 use crate::settings::{Recipe, Settings, error};
 
@@ -47,15 +47,9 @@ impl<A: Scalar> Packed<A> {
         self.uncertain.as_ref().ok_or_else(without)
     }
 
-    fn predict(&self, x: ArrayView2<'_, A>, threads: usize) -> PyResult<Array2<A>> {
+    fn predict(&self, x: ArrayView2<'_, A>) -> PyResult<Array2<A>> {
         let predictor = self.predictor.get_or_init(|| self.model.predictor());
-        let Some(pool) = pool(threads)? else {
-            return predictor.predict(&x).map_err(error);
-        };
-        let mut out = Array2::zeros((x.nrows(), self.model.outputs()));
-        pool.install(|| predictor.predict_into_parallel(&x, &mut out))
-            .map_err(error)?;
-        Ok(out)
+        predictor.predict(&x).map_err(error)
     }
 }
 
@@ -113,13 +107,17 @@ impl Network {
             let y = y.extract::<PyReadonlyArray2<'_, f64>>()?;
             let w: Option<PyReadonlyArray1<'_, f64>> = weights.map(|w| w.extract()).transpose()?;
             let (x, y, w) = (x.as_array(), y.as_array(), w.as_ref().map(|w| w.as_array()));
-            Kind::F64(py.detach(|| fit(settings, x, y, w, intervals))?)
+            Kind::F64(on_threads(py, settings.threads, || {
+                fit(settings, x, y, w, intervals)
+            })??)
         } else {
             let x = x.extract::<PyReadonlyArray2<'_, f32>>()?;
             let y = y.extract::<PyReadonlyArray2<'_, f32>>()?;
             let w: Option<PyReadonlyArray1<'_, f32>> = weights.map(|w| w.extract()).transpose()?;
             let (x, y, w) = (x.as_array(), y.as_array(), w.as_ref().map(|w| w.as_array()));
-            Kind::F32(py.detach(|| fit(settings, x, y, w, intervals))?)
+            Kind::F32(on_threads(py, settings.threads, || {
+                fit(settings, x, y, w, intervals)
+            })??)
         };
         Ok(Self { kind })
     }
@@ -130,7 +128,7 @@ impl Network {
         x: &Bound<'py, PyAny>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        either!(&self.kind, model => on_rows(py, x, |x| model.predict(x, threads)))
+        either!(&self.kind, model => on_rows(py, x, threads, |x| model.predict(x)))
     }
 
     /// Lower and upper ends, shape (rows, 2 outputs): all lower ones, then all upper ones.
@@ -142,7 +140,7 @@ impl Network {
     ) -> PyResult<Bound<'py, PyAny>> {
         either!(&self.kind, model => {
             let model = model.uncertain()?;
-            on_rows(py, x, |x| {
+            on_rows(py, x, 1, |x| {
                 let (low, high) = model.predict_interval(&x, coverage).map_err(error)?;
                 Ok(concatenate![Axis(1), low, high])
             })
@@ -157,7 +155,7 @@ impl Network {
     ) -> PyResult<Bound<'py, PyAny>> {
         either!(&self.kind, model => {
             let model = model.uncertain()?;
-            on_rows(py, x, |x| model.predict_deviation(&x).map_err(error))
+            on_rows(py, x, 1, |x| model.predict_deviation(&x).map_err(error))
         })
     }
 
@@ -237,6 +235,7 @@ pub(crate) fn precision(double: bool) -> onnx::Precision {
 #[pyclass(module = "elm_learn._elm_learn")]
 pub(crate) struct Rows {
     rows: Accumulator<f64>,
+    threads: usize,
 }
 
 #[pymethods]
@@ -251,6 +250,7 @@ impl Rows {
         let rows = Accumulator::from_sample(&params, &sample.as_array(), outputs).map_err(error)?;
         Ok(Self {
             rows: rows.with_unlike_rows(true),
+            threads: settings.threads,
         })
     }
 
@@ -268,18 +268,18 @@ impl Rows {
             weights.as_ref().map(|w| w.as_array()),
         );
         let rows = &mut self.rows;
-        py.detach(|| {
+        on_threads(py, self.threads, || {
             let mut data = Dataset::new(&x, &y)?;
             if let Some(w) = &w {
                 data = data.with_weights(w)?;
             }
             rows.push_dataset(&data)
-        })
+        })?
         .map_err(error)
     }
 
     fn fit(&self, py: Python<'_>) -> PyResult<Network> {
-        let model = py.detach(|| self.rows.fit()).map_err(error)?;
+        let model = on_threads(py, self.threads, || self.rows.fit())?.map_err(error)?;
         Ok(Network {
             kind: Kind::F64(Packed::of(model)),
         })
@@ -295,6 +295,6 @@ impl Rows {
     #[staticmethod]
     fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
         let rows = persist::from_bytes(bytes).map_err(error)?;
-        Ok(Self { rows })
+        Ok(Self { rows, threads: 1 })
     }
 }

@@ -5,6 +5,7 @@ use ndarray::{Array2, ArrayView2};
 use numpy::{Element, IntoPyArray, PyReadonlyArray2};
 use pyo3::prelude::*;
 
+use crate::pool::on_threads;
 use crate::settings::error;
 
 /// What there is for each scalar type.
@@ -55,10 +56,11 @@ impl<S: Persist, D: Persist> Either<S, D> {
 pub(crate) fn on_rows<'py, A: Element + Sync>(
     py: Python<'py>,
     x: &Bound<'py, PyAny>,
+    threads: usize,
     evaluate: impl FnOnce(ArrayView2<'_, A>) -> PyResult<Array2<A>> + Send,
 ) -> PyResult<Bound<'py, PyAny>> {
     let x = x.extract::<PyReadonlyArray2<'_, A>>()?;
     let x = x.as_array();
-    let values = py.detach(|| evaluate(x))?;
+    let values = on_threads(py, threads, || evaluate(x))??;
     Ok(values.into_pyarray(py).into_any())
 }

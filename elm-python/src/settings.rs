@@ -21,12 +21,13 @@ pub(crate) struct Settings {
     alpha: String,
     direct_links: bool,
     seed: u64,
+    pub(crate) threads: usize,
 }
 
 #[pymethods]
 impl Settings {
     #[new]
-    #[pyo3(signature = (neurons, activation, scale, alpha, direct_links, seed))]
+    #[pyo3(signature = (neurons, activation, scale, alpha, direct_links, seed, threads))]
     fn new(
         neurons: Option<usize>,
         activation: String,
@@ -34,6 +35,7 @@ impl Settings {
         alpha: String,
         direct_links: bool,
         seed: u64,
+        threads: usize,
     ) -> Self {
         Self {
             neurons,
@@ -42,6 +44,7 @@ impl Settings {
             alpha,
             direct_links,
             seed,
+            threads,
         }
     }
 }

@@ -48,8 +48,9 @@ mod spectrum;
 mod upper;
 
 use std::marker::PhantomData;
+use std::ops::Range;
 
-use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis, Ix2, s};
+use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis, Ix2, Zip, s};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
@@ -64,6 +65,7 @@ use crate::model::ElmParams;
 use crate::network::Elm;
 use crate::scalar::{Scalar, power_of_two};
 use crate::solve::Solver;
+use crate::threads;
 
 /// Rows in, a triangle kept; see the [module](self).
 ///
@@ -290,7 +292,7 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
         if self.pending.len() / self.columns() + x.nrows() >= self.block() {
             // The triangle will change: an error after that must leave no trace.
             let mut next = self.clone();
-            next.take_in(x, t, weights)?;
+            next.take_in_parts(x, t, weights)?;
             *self = next;
             self.widen_bounds(bounds);
             self.far = far;
@@ -313,6 +315,71 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
                     *none = others;
                 }
             }
+        }
+    }
+
+    /// Adds checked rows; where they are many, in parts that several threads factorize, each by itself.
+    fn take_in_parts(
+        &mut self,
+        x: ArrayView2<'_, A>,
+        t: ArrayView2<'_, A>,
+        weights: Option<ArrayView1<'_, A>>,
+    ) -> Result<()> {
+        /// Blocks of a part: putting its triangle under another costs less than half a block.
+        const BLOCKS: usize = 4;
+        /// Numbers in the blocks and triangles of all parts.
+        const ROOM: usize = 1 << 25;
+        let square = self.columns().saturating_mul(self.columns());
+        let most = (ROOM / square.saturating_mul(BLOCK + 2).max(1)).min(16);
+        let parts = (x.nrows() / (BLOCKS * self.block())).min(most);
+        if parts < 2 {
+            return self.take_in(x, t, weights);
+        }
+        let empty = self.without_rows();
+        let part_of = |rows: Range<usize>| -> Result<Self> {
+            let mut part = empty.clone();
+            let weights = weights.map(|weights| weights.slice_move(s![rows.clone()]));
+            part.take_in(
+                x.slice(s![rows.clone(), ..]),
+                t.slice(s![rows, ..]),
+                weights,
+            )?;
+            part.flush()?;
+            Ok(part)
+        };
+        let parts = threads::map(threads::split(x.nrows(), parts), part_of);
+        let mut parts = parts.into_iter().collect::<Result<Vec<_>>>()?;
+        // By twos, which are merged at the same time.
+        while parts.len() > 1 {
+            let mut pairs = Vec::new();
+            let mut rest = parts.into_iter();
+            while let Some(first) = rest.next() {
+                pairs.push((first, rest.next()));
+            }
+            let merged = threads::map(pairs, |(mut first, second)| -> Result<Self> {
+                if let Some(second) = second {
+                    first.merge_alike(&second)?;
+                }
+                Ok(first)
+            });
+            parts = merged.into_iter().collect::<Result<_>>()?;
+        }
+        parts.iter().try_for_each(|part| self.merge_alike(part))
+    }
+
+    /// As it was before the first row.
+    fn without_rows(&self) -> Self {
+        Self {
+            rows: 0,
+            weighted_rows: 0,
+            far: vec![0; self.inputs],
+            triangle: Array2::zeros(self.triangle.dim()),
+            scales: Array1::ones(self.columns()),
+            shift: None,
+            pending: Vec::new(),
+            bounds: None,
+            map: self.map.clone(),
+            ..*self
         }
     }
 
@@ -344,11 +411,12 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
                 if self.intercept {
                     self.pending.push(root);
                 }
-                for &value in h.iter().chain(t) {
-                    self.pending.push(value * root);
-                    if !(value * root).is_finite() {
-                        return Err(OVERFLOW);
-                    }
+                let first = self.pending.len();
+                self.pending
+                    .extend(h.iter().chain(t).map(|&value| value * root));
+                let row = &self.pending[first..];
+                if !row.iter().fold(true, |all, value| all & value.is_finite()) {
+                    return Err(OVERFLOW);
                 }
                 if self.pending.len() == block * self.columns() {
                     self.flush()?;
@@ -404,29 +472,22 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
         if !rows.iter().all(|v| v.is_finite()) {
             return Err(OVERFLOW);
         }
-        let mut both = Array2::zeros((columns + rows.nrows(), columns));
+        let (largest, before) = (largest(rows), largest(&self.triangle));
+        let mut factors = Array1::ones(columns);
         for (column, scale) in self.scales.iter_mut().enumerate() {
-            let largest = rows
-                .column(column)
-                .iter()
-                .fold(A::zero(), |m: A, v| m.max(v.abs()));
-            let fresh = self.triangle.column(column).iter().all(|v| *v == A::zero());
-            let wanted = power_of_two(largest);
+            let fresh = before[column] == A::zero();
+            let wanted = power_of_two(largest[column]);
             // Grows with the data; a power of two rounds nothing.
-            let factor = if largest > A::zero() && (fresh || wanted > *scale) {
-                let factor = *scale / wanted;
+            if largest[column] > A::zero() && (fresh || wanted > *scale) {
+                factors[column] = if fresh { A::one() } else { *scale / wanted };
                 *scale = wanted;
-                factor
-            } else {
-                A::one()
-            };
-            let mut target = both.column_mut(column);
-            let (mut top, mut bottom) = target.view_mut().split_at(Axis(0), columns);
-            if !fresh {
-                top.assign(&(&self.triangle.column(column) * factor));
             }
-            bottom.assign(&rows.column(column).mapv(|v| v / *scale));
         }
+        let mut both = Array2::zeros((columns + rows.nrows(), columns));
+        let (mut top, mut bottom) = both.view_mut().split_at(Axis(0), columns);
+        top.assign(&(&self.triangle * &factors));
+        bottom.assign(rows);
+        bottom /= &self.scales;
         let nothing = Array2::zeros((both.nrows(), 0));
         let QrFactor { r, .. } = A::triangularize(both.view(), nothing.view())?;
         if !r.iter().all(|v| v.is_finite()) {
@@ -435,6 +496,17 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
         self.triangle = r;
         Ok(())
     }
+}
+
+/// The largest magnitude in each column.
+fn largest<A: Scalar>(rows: &ArrayRef2<A>) -> Array1<A> {
+    let mut largest = Array1::zeros(rows.ncols());
+    for row in rows.rows() {
+        Zip::from(&mut largest)
+            .and(row)
+            .for_each(|m: &mut A, v| *m = m.max(v.abs()));
+    }
+    largest
 }
 
 /// Rows in a block, in units of the triangle's size: the triangle is factorized again with every

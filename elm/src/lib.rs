@@ -39,9 +39,9 @@
 //! what cannot be fitted or predicted is an [`Error`] that names the place.
 //!
 //! # Reproducibility
-//! One seed draws one random layer, bit for bit, on every platform. The solve is sequential, so
-//! its result does not depend on the number of threads; between processors with different vector
-//! units it agrees to rounding error.
+//! One seed draws one random layer, bit for bit, on every platform. Work is cut into parts by sizes alone, so that
+//! no digit depends on the number of threads; between processors with different vector units results agree to
+//! rounding error.
 //!
 //! # Features
 //! - `faer` (default): linear algebra in pure Rust.
@@ -50,8 +50,8 @@
 //! - `persist` (default): files, [`persist`].
 //! - `serde`: settings, networks and what they consist of in any format of serde; part of `persist`.
 //! - `onnx`: networks and classifiers as ONNX files, `elm::onnx`.
-//! - `rayon`: several threads where a call asks for them, `Predictor::predict_into_parallel` and
-//!   `ElmParams::fit_chunks_parallel`.
+//! - `rayon` (default): all cores where that pays, or as many threads as [`on_threads`] says; without it
+//!   everything runs on the thread that asks.
 
 pub mod accumulate;
 pub mod activation;
@@ -81,6 +81,7 @@ mod simd;
 pub mod solve;
 mod stats;
 mod stream;
+mod threads;
 pub mod tune;
 pub mod uncertainty;
 
@@ -99,6 +100,7 @@ pub use ndarray;
 pub use network::Elm;
 pub use predictor::{Predictor, Scratch};
 pub use scalar::Scalar;
+pub use threads::{current_threads, on_this_thread, on_threads};
 pub use tune::Tuner;
 pub use uncertainty::UncertainElm;
 

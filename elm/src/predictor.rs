@@ -25,6 +25,7 @@ use crate::metrics::r2;
 use crate::network::Elm;
 use crate::scalar::Scalar;
 use crate::simd::{Aligned, zeros};
+use crate::threads;
 
 /// A fitted network packed for evaluation; made by [`Elm::predictor`].
 ///
@@ -198,8 +199,25 @@ impl<A: Scalar, D: TargetDim> Predictor<A, D> {
         check_length("columns of inputs", x.ncols(), self.inputs())?;
         check_room("the predictions", x.nrows(), self.outputs())?;
         let mut out = Array2::zeros((x.nrows(), self.outputs()));
-        self.tiles(x, out.view_mut(), 0, &mut self.scratch())?;
+        self.tasks(x, out.view_mut())?;
         Ok(out)
+    }
+
+    /// Rows dealt to threads, each with working memory of its own; sizes are right.
+    fn tasks(&self, x: ArrayView2<'_, A>, mut out: ArrayViewMut2<'_, A>) -> Result<()> {
+        // Enough work to outweigh handing it over.
+        const TASK_ROWS: usize = 32 * TILE_ROWS;
+        let tasks = x
+            .axis_chunks_iter(Axis(0), TASK_ROWS)
+            .zip(out.axis_chunks_iter_mut(Axis(0), TASK_ROWS))
+            .enumerate()
+            .collect();
+        let done = threads::map_with(
+            tasks,
+            || self.scratch(),
+            |scratch, (task, (x, out))| self.tiles(x, out, task * TASK_ROWS, scratch),
+        );
+        done.into_iter().collect()
     }
 
     /// As [`predict`](Self::predict) into `out`, without allocating.
@@ -244,30 +262,15 @@ impl<A: Scalar, D: TargetDim> Predictor<A, D> {
         self.predict_into_matrix(&x, out, scratch)
     }
 
-    /// As [`predict_into`](Self::predict_into) on the threads of rayon's current pool, each with
-    /// working memory of its own. The result is the same bits for any number of threads.
+    /// As [`predict_into`](Self::predict_into) on several [threads](crate::on_threads), each with working
+    /// memory of its own, which is allocated. The result is the same bits for any number of threads.
     ///
     /// # Errors
-    /// Those of [`predict_into`](Self::predict_into); of several rows at fault, any may be named.
-    #[cfg(feature = "rayon")]
+    /// Those of [`predict_into`](Self::predict_into).
     pub fn predict_into_parallel(&self, x: &ArrayRef2<A>, out: &mut ArrayRef<A, D>) -> Result<()> {
-        use ndarray::parallel::prelude::*;
-
-        // Enough work to outweigh handing it over.
-        const TASK_ROWS: usize = 32 * TILE_ROWS;
-        let mut out = D::matrix_view_mut(out.view_mut());
+        let out = D::matrix_view_mut(out.view_mut());
         self.check(x, &out)?;
-        if x.nrows() == 0 {
-            return Ok(());
-        }
-        x.axis_chunks_iter(Axis(0), TASK_ROWS)
-            .into_par_iter()
-            .zip(out.axis_chunks_iter_mut(Axis(0), TASK_ROWS))
-            .enumerate()
-            .try_for_each_init(
-                || self.scratch(),
-                |scratch, (task, (x, out))| self.tiles(x, out, task * TASK_ROWS, scratch),
-            )
+        self.tasks(x.view(), out)
     }
 
     fn check(&self, x: &ArrayRef2<A>, out: &ArrayViewMut2<'_, A>) -> Result<()> {

@@ -5,7 +5,7 @@ use std::time::Instant;
 use crate::Result;
 use crate::package::Packaging;
 use crate::python::python;
-use crate::run::{command, run, say, test};
+use crate::run::{command, root, run, say, test};
 use crate::tiers::{Tiers, has_data};
 
 /// Formatting, clippy and unit tests.
@@ -37,7 +37,7 @@ fn tools() -> Result {
     run_if_installed("cargo-deny", "cargo-deny check bans licenses sources")?;
     run_if_installed("cargo-machete", "cargo-machete")?;
     for features in [
-        "-p elm-learn --features rayon,onnx",
+        "-p elm-learn --features onnx",
         "-p elm-learn --no-default-features --features faer",
         "-p elm-brdf --no-default-features --features faer",
     ] {
@@ -108,6 +108,17 @@ pub(crate) fn all() -> Result {
 
     step("the Python package: wheel, fresh environment, tests");
     python()?;
+
+    step("SQL: the package elm-datafusion");
+    for line in [
+        "cargo fmt --check",
+        "cargo clippy --all-targets --locked -- -D warnings",
+        "cargo test --locked",
+    ] {
+        let mut own = command(line);
+        own.current_dir(root().join("elm-datafusion"));
+        run(own)?;
+    }
 
     step("packages");
     Packaging::contents().run()?;

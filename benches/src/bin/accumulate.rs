@@ -68,6 +68,7 @@ impl Arguments {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    elm_benches::timing::use_threads(1);
     let arguments = Arguments::parse();
     memory(&arguments)?;
     if arguments.batch > 0 {

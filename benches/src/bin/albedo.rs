@@ -67,6 +67,7 @@ fn row(name: &str, samples: &Samples, seeds: u64) -> Result<f64, Box<dyn Error>>
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
+    elm_benches::timing::use_threads(1);
     let mut arguments = std::env::args().skip(1);
     let usage = "usage: albedo CURET_DIR SEEDS [FILE...]";
     let dir = PathBuf::from(arguments.next().ok_or(usage)?);

@@ -39,6 +39,7 @@ enum Format {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
+    elm_benches::timing::use_threads(1);
     let arguments = Arguments::parse();
     if arguments.outside {
         return outside(&arguments);

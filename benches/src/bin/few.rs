@@ -26,6 +26,7 @@ const COUNTS: [usize; 7] = [5, 10, 20, 50, 60, 100, 184];
 const WAYS: [&str; 3] = ["alone", "prior", "prior, chosen directions"];
 
 fn main() -> Result<(), Box<dyn Error>> {
+    elm_benches::timing::use_threads(1);
     let mut arguments = std::env::args().skip(1);
     let dir = PathBuf::from(arguments.next().ok_or("usage: few CURET_DIR [SEEDS]")?);
     let seeds: u64 = arguments.next().map_or(Ok(3), |seeds| seeds.parse())?;

@@ -10,6 +10,7 @@ use elm_benches::timing::fastest_seconds;
 use elm_benches::topics::ALL;
 
 fn main() -> Result<(), Error> {
+    elm_benches::timing::use_threads(1);
     println!("| topic | grows | from - to | order | growth, whole | growth, last step |");
     println!("|---|---|---|---|---|---|");
     for series in ALL {

@@ -14,6 +14,7 @@ use elm_brdf::protocol::{Folds, cross_validate};
 use elm_datasets::{Invalid, MaterialId, curet};
 
 fn main() -> Result<(), Box<dyn Error>> {
+    elm_benches::timing::use_threads(1);
     let mut arguments = std::env::args().skip(1);
     let dir = PathBuf::from(arguments.next().ok_or("usage: inputs CURET_DIR [SEEDS]")?);
     let seeds: u64 = arguments.next().map_or(Ok(5), |seeds| seeds.parse())?;

@@ -21,6 +21,7 @@ const NEURONS: usize = 500;
 const ROWS: usize = 4096;
 
 fn main() -> Result<(), Error> {
+    elm_benches::timing::use_threads(1);
     println!("multiply-adds per second, one thread (a lane's multiply-add is one):");
     let mut peaks_found = (0.0_f64, 0.0_f64);
     for (name, arch) in peaks::levels() {

@@ -20,6 +20,7 @@ use elm_datasets::{Invalid, Measurements, curet};
 const SEEDS: u64 = 8;
 
 fn main() -> Result<(), Box<dyn Error>> {
+    elm_benches::timing::use_threads(1);
     let dir = std::env::args()
         .nth(1)
         .map(PathBuf::from)

@@ -43,6 +43,7 @@ struct Arguments {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
+    elm_benches::timing::use_threads(1);
     let arguments = Arguments::parse();
     let all: Vec<MaterialId> = MaterialId::all().collect();
     let data = match &arguments.curet {

@@ -10,6 +10,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use elm_benches::peers::{Environment, Format, Plan, Rival, SIZES, Size, compare, fit_once, print};
+use elm_benches::timing;
 
 /// Fitting and predicting, ours and the peers' in turn on the same data.
 ///
@@ -30,6 +31,9 @@ struct Arguments {
     /// Seconds for the pairs of each comparison
     #[arg(long, default_value_t = 6.0)]
     seconds: f64,
+    /// Threads of all; with several, times are by the clock
+    #[arg(long, default_value_t = 1)]
+    threads: usize,
     /// The Python to make the environment with; python3 or python unless given
     #[arg(long)]
     python: Option<String>,
@@ -46,6 +50,7 @@ struct Arguments {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
+    timing::use_threads(arguments.threads);
     let sizes = if arguments.sizes.is_empty() {
         SIZES.to_vec()
     } else {

@@ -30,6 +30,7 @@ const PROTOCOLS: [Protocol; 3] = [
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
+    elm_benches::timing::use_threads(1);
     let dir = std::env::args()
         .nth(1)
         .map(PathBuf::from)

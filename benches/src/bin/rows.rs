@@ -122,6 +122,7 @@ fn megabytes(bytes: usize) -> f64 {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    elm_benches::timing::use_threads(1);
     let arguments = Arguments::parse();
     if arguments.single {
         arguments.run::<f32>()?;

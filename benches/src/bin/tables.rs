@@ -49,6 +49,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
+    elm_benches::timing::use_threads(1);
     match run(&Arguments::parse()) {
         Ok(page) => {
             if let Some(page) = page {

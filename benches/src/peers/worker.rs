@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use super::Size;
 use super::data::Problem;
 use super::rivals::Setting;
+use crate::timing;
 
 const SCRIPT: &str = include_str!("../../peers/worker.py");
 
@@ -24,7 +25,7 @@ impl Worker {
         Self::of_script(python, SCRIPT)
     }
 
-    /// Starts a script, on one thread.
+    /// Starts a script, on as many threads as ours have.
     ///
     /// # Errors
     /// Where the interpreter does not start.
@@ -38,7 +39,7 @@ impl Worker {
             "NUMEXPR_NUM_THREADS",
             "VECLIB_MAXIMUM_THREADS",
         ] {
-            command.env(variable, "1");
+            command.env(variable, timing::threads().to_string());
         }
         // Whatever the surroundings chose for some other build, numpy's OpenBLAS chooses itself.
         command.env_remove("OPENBLAS_CORETYPE");

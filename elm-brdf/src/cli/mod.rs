@@ -34,6 +34,9 @@ use crate::error::Error;
 struct Arguments {
     #[command(subcommand)]
     command: Command,
+    /// Threads; no digit of a result depends on them. 0: as many as the machine has.
+    #[arg(long, global = true, value_name = "N", default_value_t = 0)]
+    threads: usize,
 }
 
 #[derive(Debug, Subcommand)]
@@ -81,21 +84,14 @@ impl From<elm_datasets::Error> for Failure {
 #[must_use]
 pub fn run() -> ExitCode {
     let outcome = match Arguments::try_parse() {
-        Ok(Arguments { command }) => match command {
-            Command::Reproduce(arguments) => reproduce::run(&arguments),
-            Command::Fit(arguments) => fit::run(&arguments),
-            Command::Eval(arguments) => eval::run(&arguments),
-            Command::Predict(arguments) => predict::run(&arguments),
-            Command::Info(arguments) => info::run(&arguments),
-            Command::Prior(arguments) => prior::run(&arguments),
-            Command::Render(arguments) => render::run(&arguments),
-            Command::Export(arguments) => export::run(&arguments),
-            Command::Gallery(arguments) => gallery::run(&arguments),
-            Command::Compare(arguments) => compare::run(&arguments),
-            Command::Pareto(arguments) => pareto::run(&arguments),
-            #[cfg(feature = "fetch")]
-            Command::Fetch(arguments) => fetch::run(&arguments),
-        },
+        Ok(Arguments { command, threads }) => {
+            let work = || dispatch(command, threads);
+            match threads {
+                0 => work(),
+                threads => elm::on_threads(threads, work)
+                    .unwrap_or_else(|error| Err(Failure::Usage(error.to_string()))),
+            }
+        }
         Err(error) => explain(&error),
     };
     match outcome {
@@ -108,6 +104,24 @@ pub fn run() -> ExitCode {
                 1
             })
         }
+    }
+}
+
+fn dispatch(command: Command, threads: usize) -> Result<(), Failure> {
+    match command {
+        Command::Reproduce(arguments) => reproduce::run(&arguments),
+        Command::Fit(arguments) => fit::run(&arguments),
+        Command::Eval(arguments) => eval::run(&arguments),
+        Command::Predict(arguments) => predict::run(&arguments),
+        Command::Info(arguments) => info::run(&arguments),
+        Command::Prior(arguments) => prior::run(&arguments),
+        Command::Render(arguments) => render::run(&arguments, threads),
+        Command::Export(arguments) => export::run(&arguments),
+        Command::Gallery(arguments) => gallery::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
+        Command::Pareto(arguments) => pareto::run(&arguments),
+        #[cfg(feature = "fetch")]
+        Command::Fetch(arguments) => fetch::run(&arguments),
     }
 }
 

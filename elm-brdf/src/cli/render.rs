@@ -51,9 +51,6 @@ pub(super) struct Arguments {
     /// Seed of the samples instead of the scene's.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
-    /// Worker threads; the picture does not depend on them. 0: as many as the machine has.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    threads: usize,
     /// Write what was done and what was skipped to FILE as JSON, and print it.
     #[arg(long, value_name = "FILE")]
     account: Option<PathBuf>,
@@ -85,7 +82,7 @@ fn size(text: &str) -> Result<(u32, u32), String> {
     parts.ok_or_else(|| "expected WIDTHxHEIGHT, such as 640x360".to_owned())
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub(super) fn run(arguments: &Arguments, threads: usize) -> Result<(), Failure> {
     let format =
         Rendering::format(&arguments.output).map_err(|error| Failure::Usage(error.to_string()))?;
     let mut sheet = match arguments.scene.strip_prefix("builtin:") {
@@ -106,7 +103,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let library = library(arguments.folder.data.as_deref())?;
     let options = Options {
         savings: arguments.savings(),
-        threads: arguments.threads,
+        threads,
     };
     let progress = progress();
     let rendering = sheet.render(&library, options, &|done, all| {

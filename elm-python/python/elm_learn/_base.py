@@ -57,9 +57,8 @@ class ElmBase(BaseEstimator):
         if not isinstance(seed, Integral):
             seed = check_random_state(seed).randint(2**31)
         neurons = None if neurons is None else int(neurons)
-        return Settings(
-            neurons, self.activation, scale, alpha, bool(self.direct_links), int(seed)
-        )
+        links, threads = bool(self.direct_links), self._threads()
+        return Settings(neurons, self.activation, scale, alpha, links, int(seed), threads)
 
     def _threads(self) -> int:
         jobs = 1 if self.n_jobs is None else int(self.n_jobs)

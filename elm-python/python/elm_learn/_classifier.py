@@ -42,7 +42,7 @@ class ElmClassifier(ClassifierMixin, ElmBase):
     random_state : int, RandomState instance or None, default=None
         Seeds the random layer; an int gives the same model on every machine.
     n_jobs : int or None, default=None
-        Threads of predictions; -1 for all cores. The result is the same for any number.
+        Threads of fits and predictions; -1 for all cores. The result is the same for any number.
 
     Attributes
     ----------

@@ -37,7 +37,7 @@ class ElmRegressor(RegressorMixin, ElmBase):
     random_state : int, RandomState instance or None, default=None
         Seeds the random layer; an int gives the same model on every machine.
     n_jobs : int or None, default=None
-        Threads of predictions; -1 for all cores. The result is the same for any number.
+        Threads of fits and predictions; -1 for all cores. The result is the same for any number.
 
     Attributes
     ----------

@@ -1,19 +1,17 @@
 //! Fits to an iterator of chunks of rows, on one thread or on several.
 
 use ndarray::{Array, Array2, Axis, concatenate};
-#[cfg(feature = "rayon")]
-use rayon::prelude::*;
 
 use super::Accumulator;
 use crate::check::check_matrix;
 use crate::dataset::TargetDim;
 use crate::error::{Error, Result};
 use crate::feature_map::Scaler;
-#[cfg(feature = "rayon")]
 use crate::memory::check_room;
 use crate::model::ElmParams;
 use crate::network::Elm;
 use crate::scalar::Scalar;
+use crate::threads;
 
 const NO_CHUNKS: Error = Error::Empty {
     what: "chunks",
@@ -163,7 +161,7 @@ impl<A: Scalar> ElmParams<A> {
         Ok(accumulator.fit()?)
     }
 
-    /// As [`fit_chunks`](Self::fit_chunks), on the threads of the current rayon pool.
+    /// As [`fit_chunks`](Self::fit_chunks), several chunks at a time on several [threads](crate::on_threads).
     ///
     /// Chunks are dealt in turn to `parts` accumulators, which are merged in that order at the
     /// end: the result depends on `parts`, within rounding error, and not on the number of
@@ -173,7 +171,6 @@ impl<A: Scalar> ElmParams<A> {
     /// # Errors
     /// Those of [`fit_chunks`](Self::fit_chunks); [`Error::Parameter`] for no parts,
     /// [`Error::TooLarge`] for more than memory holds.
-    #[cfg(feature = "rayon")]
     pub fn fit_chunks_parallel<D: TargetDim, E: From<Error>>(
         &self,
         chunks: impl IntoIterator<Item = Result<(Array2<A>, Array<A, D>), E>>,
@@ -203,11 +200,11 @@ impl<A: Scalar> ElmParams<A> {
             if round.is_empty() {
                 break;
             }
-            let pushed: Vec<Result<()>> = accumulators
-                .par_iter_mut()
-                .zip(&round)
-                .map(|(accumulator, (x, t))| accumulator.push(x, t))
-                .collect();
+            let tasks = accumulators.iter_mut().zip(&round).collect();
+            let push = |(accumulator, (x, t)): (&mut Accumulator<A, D>, &Chunk<A, D>)| {
+                accumulator.push(x, t)
+            };
+            let pushed = threads::map(tasks, push);
             pushed.into_iter().collect::<Result<()>>()?;
             round.clear();
         }

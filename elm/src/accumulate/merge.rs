@@ -31,23 +31,29 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
             }
         }
         let mut next = self.clone();
-        next.widen_bounds(other.bounds.clone());
+        next.merge_alike(other)?;
+        *self = next;
+        Ok(())
+    }
+
+    /// As [`merge`](Self::merge), of one with the same layer and settings; after an error half done.
+    pub(super) fn merge_alike(&mut self, other: &Self) -> Result<()> {
+        self.widen_bounds(other.bounds.clone());
         if other.has_triangle() {
             let mut other = other.clone();
-            next.flush()?;
+            self.flush()?;
             other.flush()?;
             let mut rows = &other.triangle * &other.scales;
-            next.take_over(&other, rows.view_mut());
-            next.absorb(&rows)?;
+            self.take_over(&other, rows.view_mut());
+            self.absorb(&rows)?;
         } else {
-            next.take_pending(&other.pending)?;
+            self.take_pending(&other.pending)?;
         }
-        next.rows = next.rows.saturating_add(other.rows);
-        next.weighted_rows = next.weighted_rows.saturating_add(other.weighted_rows);
-        for (far, more) in next.far.iter_mut().zip(&other.far) {
+        self.rows = self.rows.saturating_add(other.rows);
+        self.weighted_rows = self.weighted_rows.saturating_add(other.weighted_rows);
+        for (far, more) in self.far.iter_mut().zip(&other.far) {
             *far = far.saturating_add(*more);
         }
-        *self = next;
         Ok(())
     }
 

@@ -116,12 +116,11 @@ impl<A: Scalar> ClassPredictor<A> {
         Ok(())
     }
 
-    /// As [`predict_proba_into`](Self::predict_proba_into) on the threads of rayon's current pool; the
-    /// same bits for any number of threads.
+    /// As [`predict_proba_into`](Self::predict_proba_into) on several [threads](crate::on_threads); the
+    /// same bits for any number of them.
     ///
     /// # Errors
     /// Those of [`Predictor::predict_into_parallel`].
-    #[cfg(feature = "rayon")]
     pub fn predict_proba_into_parallel(
         &self,
         x: &ArrayRef2<A>,

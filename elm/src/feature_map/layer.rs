@@ -13,6 +13,7 @@ use crate::activation::Activation;
 use crate::check::{check_length, check_matrix};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
+use crate::threads;
 
 /// The random hidden layer of a network: it is drawn, never trained.
 ///
@@ -76,6 +77,26 @@ impl<A: Scalar> NeuronBlock<A> {
 impl<A: Scalar> HiddenLayer<A> {
     /// The hidden-layer matrix of `x`: shape (rows, inputs) to (rows, neurons).
     pub(crate) fn forward(&self, x: ArrayView2<'_, A>) -> Array2<A> {
+        /// Rows that one thread takes at a time.
+        const ROWS: usize = 512;
+        // A function of the activation costs some tens of multiplications.
+        let work = x.nrows() * self.neurons().saturating_mul(x.ncols() + 16);
+        if work < threads::WORTHWHILE || x.nrows() < 2 * ROWS {
+            return self.forward_rows(x);
+        }
+        let mut h = Array2::zeros((x.nrows(), self.neurons()));
+        let parts = x.axis_chunks_iter(Axis(0), ROWS);
+        let parts = parts.zip(h.axis_chunks_iter_mut(Axis(0), ROWS)).collect();
+        threads::map(
+            parts,
+            |(x, mut to): (ArrayView2<'_, A>, ArrayViewMut2<'_, A>)| {
+                to.assign(&self.forward_rows(x));
+            },
+        );
+        h
+    }
+
+    fn forward_rows(&self, x: ArrayView2<'_, A>) -> Array2<A> {
         if let [group] = self.groups.as_slice()
             && group.radial.is_none()
         {

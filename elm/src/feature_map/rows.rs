@@ -15,7 +15,6 @@ use crate::simd::Lanes;
 /// the matrix of features never exists as a whole.
 pub(crate) struct FeatureRows<'a, A: Scalar> {
     map: PackedMap<A>,
-    buffers: TileBuffers<A>,
     direct_links: bool,
     x: ArrayView2<'a, A>,
 }
@@ -27,7 +26,6 @@ impl<'a, A: Scalar> FeatureRows<'a, A> {
         let direct_links = map.direct_links();
         let map = PackedMap::new(map, no_outputs.view(), Vec::new());
         Self {
-            buffers: map.buffers(),
             map,
             direct_links,
             x,
@@ -49,37 +47,41 @@ impl<'a, A: Scalar> FeatureRows<'a, A> {
         self.map.packed.neurons + links
     }
 
+    /// Working memory for [`write`](Self::write).
+    pub(crate) fn buffers(&self) -> TileBuffers<A> {
+        self.map.buffers()
+    }
+
     /// Writes these rows to `to`, each to the beginning of a line of `stride` values, less `shift`.
     pub(crate) fn write(
-        &mut self,
+        &self,
         rows: Range<usize>,
         shift: &[A],
-        to: &mut [A],
-        stride: usize,
+        (to, stride): (&mut [A], usize),
+        buffers: &mut TileBuffers<A>,
     ) -> Result<()> {
         let offset = rows.start;
         let x = self.x.slice_move(s![rows, ..]);
         for (tile, x) in x.axis_chunks_iter(Axis(0), TILE_ROWS).enumerate() {
             let first = tile * TILE_ROWS;
             let to = &mut to[first * stride..];
-            self.tile(x, offset + first, shift, to, stride)?;
+            self.tile((x, offset + first), shift, (to, stride), buffers)?;
         }
         Ok(())
     }
 
     fn tile(
-        &mut self,
-        x: ArrayView2<'_, A>,
-        offset: usize,
+        &self,
+        (x, offset): (ArrayView2<'_, A>, usize),
         shift: &[A],
-        to: &mut [A],
-        stride: usize,
+        (to, stride): (&mut [A], usize),
+        buffers: &mut TileBuffers<A>,
     ) -> Result<()> {
         let rows = x.nrows();
         let (packed, level) = (&self.map.packed, self.map.level);
         // Panels of each group are filled up, so that a neuron's index is not its position.
         let mut first = 0;
-        self.map.tile(x, offset, &mut self.buffers, |chunk| {
+        self.map.tile(x, offset, buffers, |chunk| {
             let columns = first..first + chunk.neurons;
             level.run(Shift {
                 from: chunk.hidden,
@@ -91,7 +93,7 @@ impl<'a, A: Scalar> FeatureRows<'a, A> {
             first = columns.end;
         })?;
         if self.direct_links {
-            let inputs = &self.buffers.inputs[..rows * packed.inputs];
+            let inputs = &buffers.inputs[..rows * packed.inputs];
             let links = packed.neurons..packed.neurons + packed.inputs;
             for (row, inputs) in tile_rows(inputs, packed.inputs, rows) {
                 let to = &mut to[row * stride..][links.clone()];

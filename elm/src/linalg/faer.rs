@@ -4,7 +4,10 @@ mod gram;
 
 use faer::diag::DiagMut;
 use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_scratch};
 use faer::linalg::householder::{
+    apply_block_householder_sequence_on_the_left_in_place_with_conj as apply_q,
+    apply_block_householder_sequence_transpose_on_the_left_in_place_scratch as sequence_scratch,
     apply_block_householder_sequence_transpose_on_the_left_in_place_with_conj as apply_q_transpose,
     apply_block_householder_transpose_on_the_left_in_place_scratch as householder_scratch,
     apply_block_householder_transpose_on_the_left_in_place_with_conj as apply_reflections,
@@ -24,8 +27,9 @@ use ndarray::{Array1, Array2, ArrayView2, Axis, CowArray, Ix2, ShapeBuilder, s};
 use num_traits::Zero;
 use pulp::{Simd, WithSimd};
 
-use super::{Backend, CholeskySolve, Failure, QrFactor, Svd};
+use super::{Backend, CholeskySolve, Eigen, Failure, QrFactor, Svd};
 use crate::simd::{Lanes, Level, Real};
+use crate::threads;
 use gram::add_gram;
 
 const PAR: Par = Par::Seq;
@@ -74,21 +78,67 @@ fn product<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>, b: ArrayView2<'_, A
     }
     let (a, b) = (gapless(a), gapless(b));
     let (rows, columns) = out.dim();
+    let work = rows.saturating_mul(columns).saturating_mul(a.ncols());
+    let slab = rows.div_ceil(parts(work).min(rows / 32).max(1));
     let slice = out.as_slice_memory_order_mut().unwrap_or(&mut []);
-    let dst = MatMut::from_row_major_slice_mut(slice, rows, columns);
-    matmul(
-        dst,
-        Accum::Replace,
-        view(a.view()),
-        view(b.view()),
-        faer::traits::math_utils::one(),
-        PAR,
-    );
+    let (left, right) = (view(a.view()), view(b.view()));
+    let slabs = slice.chunks_mut(slab * columns).enumerate().collect();
+    threads::map(slabs, |(number, to): (usize, &mut [A])| {
+        let rows = to.len() / columns;
+        matmul(
+            MatMut::from_row_major_slice_mut(to, rows, columns),
+            Accum::Replace,
+            left.subrows(number * slab, rows),
+            right,
+            faer::traits::math_utils::one(),
+            PAR,
+        );
+        clean(());
+    });
     out
 }
 
+/// Into how many parts so many multiplications are cut.
+fn parts(work: usize) -> usize {
+    const MOST: usize = 16;
+    (work / (4 * threads::WORTHWHILE)).clamp(1, MOST)
+}
+
+fn eigen<A: RealField + Copy + Zero + PartialOrd>(
+    a: ArrayView2<'_, A>,
+) -> Result<Eigen<A>, Failure> {
+    let n = a.nrows();
+    let a = gapless(a);
+    let mut values = Array1::zeros(n);
+    let mut vectors = Array2::zeros((n, n).f());
+    let yes = ComputeEigenvectors::Yes;
+    let scratch = self_adjoint_evd_scratch::<A>(n, yes, PAR, Default::default());
+    self_adjoint_evd(
+        view(a.view()),
+        DiagMut::from_slice_mut(values.as_slice_memory_order_mut().unwrap_or(&mut [])),
+        Some(view_mut(&mut vectors)),
+        PAR,
+        MemStack::new(&mut MemBuffer::new(scratch)),
+        Default::default(),
+    )
+    .map_err(|_| Failure::NoConvergence)?;
+    // They rise.
+    values.invert_axis(Axis(0));
+    vectors.invert_axis(Axis(1));
+    let positive = |value: A| if value > A::zero() { value } else { A::zero() };
+    Ok(Eigen {
+        values: values.mapv_into(positive),
+        vt: vectors.reversed_axes().as_standard_layout().into_owned(),
+    })
+}
+
 fn decompose<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>) -> Result<Svd<A>, Failure> {
+    /// Multiplications above which threads pay for factorizing a triangle by itself.
+    const LARGE: usize = 1 << 26;
     let (rows, columns) = a.dim();
+    if rows >= 2 * columns && rows.saturating_mul(columns * columns) >= LARGE {
+        return decompose_by_triangle(a);
+    }
     let k = rows.min(columns);
     let a = gapless(a);
     let mut s = Array1::zeros(k);
@@ -111,6 +161,64 @@ fn decompose<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>) -> Result<Svd<A>,
         s,
         vt: v.reversed_axes(),
     })
+}
+
+/// Of a matrix of many rows: of its triangle, whose left singular vectors are then rotated back.
+fn decompose_by_triangle<A: RealField + Copy + Zero>(
+    a: ArrayView2<'_, A>,
+) -> Result<Svd<A>, Failure> {
+    let (rows, columns) = a.dim();
+    let (basis, factor) = factorized(a);
+    let Svd { u: inner, s, vt } = decompose(upper(&basis).view())?;
+    let mut u = Array2::zeros((rows, columns).f());
+    u.slice_mut(s![..columns, ..]).assign(&inner);
+    in_slabs(view_mut(&mut u), 2 * rows * columns, |slab| {
+        let scratch = sequence_scratch::<A>(rows, factor.nrows(), slab.ncols());
+        let (basis, factor) = (view(basis.view()), view(factor.view()));
+        let mut memory = MemBuffer::new(scratch);
+        let stack = MemStack::new(&mut memory);
+        apply_q(basis, factor, Conj::No, slab, PAR, stack);
+    });
+    Ok(Svd { u, s, vt })
+}
+
+/// A copy of a matrix in which [`factorize`] has left its triangle and reflections, and their factors.
+fn factorized<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>) -> (Array2<A>, Array2<A>) {
+    let (rows, columns) = a.dim();
+    let mut basis = by_columns(a);
+    let block = qr::factor::recommended_block_size::<A>(rows, columns);
+    let mut factor = Array2::zeros((block, columns).f());
+    let mut memory = MemBuffer::new(householder_scratch::<A>(rows, block, columns));
+    let stack = MemStack::new(&mut memory);
+    factorize(view_mut(&mut basis), view_mut(&mut factor), stack);
+    (basis, factor)
+}
+
+/// The triangle that [`factorize`] leaves.
+fn upper<A: Copy + Zero>(basis: &Array2<A>) -> Array2<A> {
+    let columns = basis.ncols();
+    Array2::from_shape_fn((columns, columns), |(i, j)| {
+        if i <= j { basis[[i, j]] } else { A::zero() }
+    })
+}
+
+/// Hands slabs of columns to `apply`, on several threads where `work` multiplications for each column are
+/// worth it.
+fn in_slabs<A: Send>(mut rest: MatMut<'_, A>, work: usize, apply: impl Fn(MatMut<'_, A>) + Sync) {
+    let columns = rest.ncols();
+    let most = parts(work.saturating_mul(columns)).min(columns / 48);
+    let slab = columns.div_ceil(most.max(1)).max(1);
+    let mut slabs = Vec::new();
+    while rest.ncols() > slab {
+        let (next, others) = rest.split_at_col_mut(slab);
+        slabs.push(next);
+        rest = others;
+    }
+    slabs.push(rest);
+    threads::map(slabs, |slab| {
+        apply(slab);
+        clean(());
+    });
 }
 
 fn singular_values<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>) -> Result<Array1<A>, Failure> {
@@ -137,30 +245,20 @@ fn triangularize<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
     b: ArrayView2<'_, A>,
 ) -> QrFactor<A> {
     let (rows, columns) = a.dim();
-    let mut basis = by_columns(a);
-    let block = qr::factor::recommended_block_size::<A>(rows, columns);
-    let mut factor = Array2::zeros((block, columns).f());
-    let width = columns.max(b.ncols());
-    let mut memory = MemBuffer::new(householder_scratch::<A>(rows, block, width));
-    let stack = MemStack::new(&mut memory);
-    factorize(view_mut(&mut basis), view_mut(&mut factor), stack);
+    let (basis, factor) = factorized(a);
     let mut qtb = by_columns(b);
-    apply_q_transpose(
-        view(basis.view()),
-        view(factor.view()),
-        Conj::No,
-        view_mut(&mut qtb),
-        PAR,
-        stack,
-    );
-    let r = Array2::from_shape_fn((columns, columns), |(i, j)| {
-        if i <= j { basis[[i, j]] } else { A::zero() }
+    in_slabs(view_mut(&mut qtb), 2 * rows * columns, |slab| {
+        let scratch = sequence_scratch::<A>(rows, factor.nrows(), slab.ncols());
+        let (basis, factor) = (view(basis.view()), view(factor.view()));
+        let mut memory = MemBuffer::new(scratch);
+        let stack = MemStack::new(&mut memory);
+        apply_q_transpose(basis, factor, Conj::No, slab, PAR, stack);
     });
     let residual_ss = qtb.slice(s![columns.., ..]).map_axis(Axis(0), |column| {
         column.iter().fold(A::zero(), |sum, &v| sum + v * v)
     });
     QrFactor {
-        r,
+        r: upper(&basis),
         qtb: qtb.slice(s![..columns, ..]).to_owned(),
         residual_ss,
     }
@@ -183,7 +281,14 @@ fn factorize<A: RealField>(mut a: MatMut<'_, A>, mut factor: MatMut<'_, A>, stac
         let mut factor = factor.rb_mut().submatrix_mut(0, first, width, width);
         factorize_panel(panel.rb_mut(), factor.rb_mut(), stack);
         if rest.ncols() > 0 {
-            apply_reflections(panel.rb(), factor.rb(), Conj::No, rest, PAR, stack);
+            let (panel, factor) = (panel.rb(), factor.rb());
+            let (rows, block) = (panel.nrows(), panel.ncols());
+            in_slabs(rest, 2 * rows * block, |slab| {
+                let scratch = householder_scratch::<A>(rows, block, slab.ncols());
+                let mut memory = MemBuffer::new(scratch);
+                let stack = MemStack::new(&mut memory);
+                apply_reflections(panel, factor, Conj::No, slab, PAR, stack);
+            });
         }
     }
 }
@@ -366,6 +471,10 @@ macro_rules! kernel {
 
             fn svd(a: ArrayView2<'_, Self>) -> Result<Svd<Self>, Failure> {
                 clean(decompose(a))
+            }
+
+            fn eigen(a: ArrayView2<'_, Self>) -> Result<Eigen<Self>, Failure> {
+                clean(eigen(a))
             }
 
             fn singular_values(a: ArrayView2<'_, Self>) -> Result<Array1<Self>, Failure> {

@@ -7,12 +7,12 @@ use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 use ndarray_linalg::error::LinalgError;
 use ndarray_linalg::{
-    CholeskyInto, Diag, FactorizeInto, JobSvd, Lapack, QRInto, SVDDCInto, Solve, SolveTriangular,
-    UPLO,
+    CholeskyInto, Diag, Eigh, FactorizeInto, JobSvd, Lapack, QRInto, SVDDCInto, Solve,
+    SolveTriangular, UPLO,
 };
 use num_traits::Zero;
 
-use super::{Backend, CholeskySolve, Failure, QrFactor, Svd};
+use super::{Backend, CholeskySolve, Eigen, Failure, QrFactor, Svd};
 
 #[allow(unsafe_code)]
 unsafe extern "C" {
@@ -53,6 +53,18 @@ fn decompose<A: Lapack<Real = A>>(a: ArrayView2<'_, A>) -> Result<Svd<A>, Failur
         (Some(u), s, Some(vt)) => Ok(Svd { u, s, vt }),
         _ => Err(Failure::NoConvergence),
     }
+}
+
+fn eigen<A: Lapack<Real = A>>(a: ArrayView2<'_, A>) -> Result<Eigen<A>, Failure> {
+    let (values, vectors) = by_rows(a).eigh(UPLO::Lower).map_err(no_convergence)?;
+    let rising = values.len();
+    Ok(Eigen {
+        values: Array1::from_shape_fn(rising, |i| {
+            let value = values[rising - 1 - i];
+            if value > A::zero() { value } else { A::zero() }
+        }),
+        vt: Array2::from_shape_fn((rising, rising), |(i, j)| vectors[[j, rising - 1 - i]]),
+    })
 }
 
 fn triangularize<A: Lapack<Real = A>>(
@@ -134,6 +146,11 @@ macro_rules! kernel {
             fn svd(a: ArrayView2<'_, Self>) -> Result<Svd<Self>, Failure> {
                 sequential();
                 decompose(a)
+            }
+
+            fn eigen(a: ArrayView2<'_, Self>) -> Result<Eigen<Self>, Failure> {
+                sequential();
+                eigen(a)
             }
 
             fn singular_values(a: ArrayView2<'_, Self>) -> Result<Array1<Self>, Failure> {

@@ -1,8 +1,8 @@
 //! The few linear algebra primitives that the solvers need, and the only place that names a
 //! linear algebra crate. One file per back end; all take any strides and expect finite input.
 //!
-//! Sequential: at the sizes of an ELM the threads cost more than they bring, and a result must
-//! not depend on how many there are.
+//! What is worth it is cut into parts for several threads, by sizes alone, so that a result does not depend
+//! on how many threads there are; the linear algebra crates themselves stay on one.
 
 #[cfg(all(feature = "faer", not(feature = "openblas-system")))]
 mod faer;
@@ -34,6 +34,16 @@ pub struct Svd<A> {
     /// Length min(rows, columns).
     pub s: Array1<A>,
     /// Shape (min(rows, columns), columns).
+    pub vt: Array2<A>,
+}
+
+/// The eigenvalues and eigenvectors of a symmetric matrix that has no negative ones: $A = V
+/// \operatorname{diag}(\lambda) V^T$.
+#[derive(Debug, Clone)]
+pub struct Eigen<A> {
+    /// Falling; what rounding makes negative is 0.
+    pub values: Array1<A>,
+    /// An eigenvector in each row.
     pub vt: Array2<A>,
 }
 
@@ -80,6 +90,9 @@ pub trait Backend: Sized {
 
     /// The singular values alone, falling.
     fn singular_values(a: ArrayView2<'_, Self>) -> Result<Array1<Self>, Failure>;
+
+    /// Of a symmetric matrix without negative eigenvalues, of which the lower half is read.
+    fn eigen(a: ArrayView2<'_, Self>) -> Result<Eigen<Self>, Failure>;
 
     /// $A = QR$ for `a` with at least as many rows as columns, applied to `b`.
     fn triangularize(
@@ -186,6 +199,21 @@ mod tests {
                 assert_abs_diff_eq!(vt.dot(&vt.t()), Array2::eye(k), epsilon = 1e-12);
                 assert_abs_diff_eq!(f64::singular_values(a).unwrap(), s, epsilon = 1e-12);
             }
+        }
+    }
+
+    #[test]
+    fn symmetric_matrices_have_their_eigenvectors() {
+        for n in [1, 2, 7, 60, 150] {
+            let a = f64::gram(random(n / 2 + 1, n, 9).view());
+            let Eigen { values, vt } = f64::eigen(a.view()).unwrap();
+            assert!(values.windows(2).into_iter().all(|pair| pair[0] >= pair[1]));
+            assert!(values.iter().all(|value| *value >= 0.0));
+            let again = vt.t().dot(&(&vt * &values.view().insert_axis(Axis(1))));
+            assert_abs_diff_eq!(again, both_halves(&a), epsilon = 1e-12 * n as f64);
+            assert_abs_diff_eq!(vt.dot(&vt.t()), Array2::eye(n), epsilon = 1e-13 * n as f64);
+            let svd = f64::svd(both_halves(&a).view()).unwrap();
+            assert_abs_diff_eq!(values, svd.s, epsilon = 1e-12 * n as f64);
         }
     }
 

@@ -116,13 +116,13 @@ impl<A: Scalar> ElmParams<A> {
             let lambda = validator.select_lambda_by_folds(groups, ridge)?;
             return Ok(Elm::assemble(map, validator.solve(&lambda)?, bounds));
         }
-        let mut source = RowSource {
+        let source = RowSource {
             hidden: HiddenRows::Map(Box::new(FeatureRows::new(&map, x))),
             targets: t,
             weights,
             intercept: self.intercept(),
         };
-        let solution = match self.solver.solve_rows(&mut source)? {
+        let solution = match self.solver.solve_rows(&source)? {
             Some(solution) => solution,
             None => {
                 let design = Self::design(x, &map)?;

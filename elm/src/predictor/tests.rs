@@ -382,7 +382,6 @@ fn a_prediction_beyond_the_range_of_the_type_is_an_overflow() {
     );
 }
 
-#[cfg(feature = "rayon")]
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
     let model = model(&ElmParams::new(50), 3, 2);
@@ -390,12 +389,9 @@ fn any_number_of_threads_gives_the_same_bits() {
     let x = inputs(3000, 3, 4);
     let expected = predictor.predict(&x).unwrap();
     for threads in [1, 2, 5] {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
         let mut out = Array2::zeros((3000, 2));
-        pool.install(|| predictor.predict_into_parallel(&x, &mut out))
+        crate::on_threads(threads, || predictor.predict_into_parallel(&x, &mut out))
+            .unwrap()
             .unwrap();
         assert_eq!(out, expected, "{threads} threads");
     }

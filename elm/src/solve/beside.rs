@@ -12,7 +12,7 @@
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, ShapeBuilder, s};
 
 use crate::error::Result;
-use crate::linalg::{Backend, Svd};
+use crate::linalg::{Backend, Eigen};
 
 /// Columns that many layers are solved beside, of rows that count, all of positive weight.
 pub(crate) struct SharedColumns {
@@ -91,8 +91,8 @@ impl SharedColumns {
         });
         let (centered, mean) = center(u, roots.as_ref());
         let (targets, target_mean) = center(targets, roots.as_ref());
-        let gram = whole(&f64::gram(centered.view()));
-        let Svd { s, vt, .. } = f64::svd(gram.view())?;
+        let gram = f64::gram(centered.view());
+        let Eigen { values: s, vt } = f64::eigen(gram.view())?;
         let largest = s.first().copied().unwrap_or(0.0);
         let kept = s.iter().filter(|s| **s > 1e-13 * largest).count();
         let vectors = vt.slice(s![..kept, ..]).t().to_owned();
@@ -253,15 +253,15 @@ fn center(matrix: ArrayView2<'_, f64>, roots: Option<&Array1<f64>>) -> (Array2<f
     (centered, mean)
 }
 
-/// A symmetric matrix of its lower half.
-fn whole(lower: &Array2<f64>) -> Array2<f64> {
-    Array2::from_shape_fn(lower.dim(), |(i, j)| lower[[i.max(j), i.min(j)]])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use ndarray::concatenate;
+
+    /// A symmetric matrix of its lower half.
+    fn whole(lower: &Array2<f64>) -> Array2<f64> {
+        Array2::from_shape_fn(lower.dim(), |(i, j)| lower[[i.max(j), i.min(j)]])
+    }
 
     fn wave(rows: usize, columns: usize, step: f64) -> Array2<f64> {
         Array2::from_shape_fn((rows, columns), |(i, j)| {

@@ -46,7 +46,7 @@ pub(super) fn allowed<A: Scalar>(lambda: f64) -> bool {
 /// # Errors
 /// Those of making the rows.
 pub(super) fn solve_rows<A: Scalar>(
-    source: &mut RowSource<'_, A>,
+    source: &RowSource<'_, A>,
     lambda: f64,
 ) -> Result<Option<Solution<A>>> {
     if source.rows() < source.neurons() {

@@ -1,14 +1,19 @@
 //! Leave-one-out scores of many strengths at once: from the rows of a factorization, or from rows
 //! that pass by a tile at a time.
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
 
 use super::Route;
 use super::design_svd::{DesignSvd, DesignSvdWithRows};
+use super::normal_equations::runs;
 use super::tiles::Tiles;
 use crate::error::Result;
 use crate::linalg::{Backend, QrFactor};
 use crate::scalar::Scalar;
+use crate::threads;
 
 /// The share of a score that rounding errors must have for them to be looked at closely.
 pub(super) const NEGLIGIBLE: f64 = 1e-6;
@@ -20,6 +25,7 @@ const SCORED_ROWS: usize = 256;
 ///
 /// Rows pass by once, a block of them for all candidates: products of matrices, where a candidate
 /// by itself would read all rows for a product with a vector.
+#[derive(Clone)]
 struct Scores<'p, A: Scalar> {
     spectrum: &'p DesignSvd<A>,
     /// What each candidate holds back of each direction, shape (directions, candidates).
@@ -117,14 +123,29 @@ pub(super) fn scores<A: Scalar>(
     let mut scores = Scores::new(&rows.spectrum, candidates, false);
     let frame = &rows.spectrum.frame;
     let counts = frame.weights_differ().then(|| frame.counts()).flatten();
-    for first in (0..rows.u.nrows()).step_by(SCORED_ROWS) {
-        let block = first..rows.u.nrows().min(first + SCORED_ROWS);
+    let add = |scores: &mut Scores<'_, A>, block: Range<usize>| {
         scores.add_counted(
             rows.u.slice(s![block.clone(), ..]),
             rows.residual.slice(s![block.clone(), ..]),
             rows.one_minus_leverage.slice(s![block.clone()]),
             counts.as_ref().map(|counts| counts.slice(s![block])),
         );
+    };
+    let blocks: Vec<_> = runs(0..rows.u.nrows(), SCORED_ROWS).collect();
+    let work = rows.u.len().saturating_mul(candidates.len());
+    if work < threads::WORTHWHILE {
+        for block in blocks {
+            add(&mut scores, block);
+        }
+    } else {
+        let empty = &scores;
+        let sums_of = |block| {
+            let mut own = empty.clone();
+            add(&mut own, block);
+            own.sums
+        };
+        let parts = threads::map(blocks, sums_of);
+        parts.iter().for_each(|part| scores.sums += part);
     }
     scores.finish(candidates, roundoff)
 }
@@ -143,37 +164,46 @@ pub(super) fn scores_of_tiles<A: Scalar>(
     candidates: &[f64],
     roundoff: f64,
 ) -> Result<Array2<f64>> {
-    /// Condition up to which leverages may be computed in `f32`.
-    const MAX_SINGLE_PRECISION_CONDITION: f64 = 1e3;
     let mean = means(spectrum);
     let condition = match (spectrum.s.first(), spectrum.s.last()) {
         (Some(first), Some(last)) => first / last,
         _ => 1.0,
     };
-    let single = spectrum.route == Route::GramSvd && condition <= MAX_SINGLE_PRECISION_CONDITION;
-    let mut pass = Pass {
-        to_u: &spectrum.vt.t() / &spectrum.s,
+    let lightest = Light::limit(condition);
+    // Where half of the rows would be done again, the first time is lost.
+    let leverage = spectrum.s.len() as f64 / spectrum.frame.weighted_rows as f64;
+    let single = spectrum.route == Route::GramSvd && leverage < 0.7 * lightest;
+    let pass = Pass {
+        to_u: Arc::new(&spectrum.vt.t() / &spectrum.s),
         scores: Scores::new(spectrum, candidates, single),
         close: Vec::new(),
     };
-    if single {
-        let mut light = Light::new(spectrum, candidates);
-        for range in tiles.ranges() {
+    let light = single.then(|| Light::new(spectrum, candidates, lightest));
+    let seen = &*tiles;
+    let score = |part: Range<usize>| {
+        let (mut pass, mut memory) = (pass.clone(), seen.memory());
+        for range in seen.ranges(part) {
             let first = range.start;
-            let tile = tiles.tile(range, &mean)?;
-            let heavy = light.add(tile);
+            let tile = seen.tile(range.clone(), &mean, &mut memory)?;
+            let Some(light) = &light else {
+                pass.add(tile, &range.collect::<Vec<_>>());
+                continue;
+            };
+            let heavy = light.add(tile, &mut pass.scores.sums);
             if !heavy.is_empty() {
                 let rows: Vec<usize> = heavy.iter().map(|row| first + row).collect();
                 pass.add(tile.select(Axis(0), &heavy).view(), &rows);
             }
         }
-        pass.scores.sums += &light.sums;
+        Ok(pass)
+    };
+    let passed = threads::reduce(seen.parts(), score, |all, part| {
+        all.scores.sums += &part.scores.sums;
+        all.close.extend(part.close);
+    })?;
+    let mut pass = passed.unwrap_or(pass);
+    if single {
         pass.scores.sums += &squared_residuals(spectrum, candidates);
-    } else {
-        for range in tiles.ranges() {
-            let rows: Vec<usize> = range.clone().collect();
-            pass.add(tiles.tile(range, &mean)?, &rows);
-        }
     }
     if !pass.close.is_empty() {
         let close = &pass.close;
@@ -196,9 +226,10 @@ pub(super) fn squared_residuals(spectrum: &DesignSvd<f64>, candidates: &[f64]) -
 }
 
 /// A pass over rows in `f64`.
+#[derive(Clone)]
 struct Pass<'p> {
     /// What takes a row to its coordinates in the left singular vectors.
-    to_u: Array2<f64>,
+    to_u: Arc<Array2<f64>>,
     scores: Scores<'p, f64>,
     /// Rows that all but determine their own fit.
     close: Vec<usize>,
@@ -242,23 +273,33 @@ impl Pass<'_> {
 
 /// A pass over rows in `f32`, for those that have little leverage.
 ///
-/// Leave-one-out adds $e_i^2 ((1 - h_i)^{-2} - 1)$ to a squared residual, which is about $2 h_i$ of it. With
-/// $h_i$ up to 0.02 and a condition of up to 1e3, which is what the rounding of single precision may be
-/// multiplied by, the sum over rows is off by 1e-6 of itself at most, and as the errors of rows have
-/// nothing to do with each other by far less.
+/// Leave-one-out adds $e_i^2 ((1 - h_i)^{-2} - 1)$ to a squared residual, which an error of $\delta$ in
+/// $h_i$ changes by $2 \delta (1 - h_i)^{-3}$ of that. The leverage $h_i$ is off by as much of itself as the
+/// condition $\kappa$ multiplies the rounding of single precision by. Where
+/// $\kappa h_i (1 - h_i)^{-3}$ is at most 21, as it is for leverages of 0.02 and a condition of 1000, the sum
+/// over rows is off by 3e-6 of itself at most, and as the errors of rows have nothing to do with each other
+/// by far less.
 struct Light {
+    /// The leverage up to which rows are light.
+    limit: f32,
     to_u: Array2<f32>,
     /// What each candidate keeps of each direction, shape (directions, candidates).
     kept: Array2<f32>,
     /// Of each output the output weights of all candidates, shape (neurons, candidates).
     beta: Vec<Array2<f32>>,
     total_weight: f32,
-    /// What leave-one-out adds, shape (candidates, outputs).
-    sums: Array2<f64>,
 }
 
 impl Light {
-    fn new(spectrum: &DesignSvd<f64>, candidates: &[f64]) -> Self {
+    /// The leverage up to which rows of a problem of this condition are light; nothing above 1000.
+    fn limit(condition: f64) -> f64 {
+        let ratio = 21.0 / condition;
+        // Satisfies h / (1 - h)^3 <= ratio, and leaves the differences from 1 their digits.
+        let limit = (ratio / (1.0 + 3.0 * ratio)).min(0.25);
+        if condition <= 1e3 { limit } else { 0.0 }
+    }
+
+    fn new(spectrum: &DesignSvd<f64>, candidates: &[f64], limit: f64) -> Self {
         let narrow = |values: &Array2<f64>| values.mapv(f32::from_f64);
         let mut kept = Array2::zeros((spectrum.s.len(), candidates.len()));
         for (mut column, &lambda) in kept.columns_mut().into_iter().zip(candidates) {
@@ -270,18 +311,17 @@ impl Light {
             narrow(&f64::product(spectrum.vt.t(), along.view()))
         };
         Self {
+            limit: f32::from_f64(limit),
             to_u: narrow(&(&spectrum.vt.t() / &spectrum.s)),
             beta: spectrum.c.columns().into_iter().map(beta).collect(),
             kept: narrow(&kept),
             total_weight: f32::from_f64(spectrum.frame.total_weight),
-            sums: Array2::zeros((candidates.len(), spectrum.c.ncols())),
         }
     }
 
-    /// Adds the rows of a tile; returns those that have too much leverage, and have not been added.
-    fn add(&mut self, tile: ArrayView2<'_, f64>) -> Vec<usize> {
-        /// The leverage up to which rows are light.
-        const LIGHT: f32 = 0.02;
+    /// Adds what leave-one-out adds for the rows of a tile to `sums`, shape (candidates, outputs); returns
+    /// those that have too much leverage, and have not been added.
+    fn add(&self, tile: ArrayView2<'_, f64>, sums: &mut Array2<f64>) -> Vec<usize> {
         let neurons = self.to_u.nrows();
         let (hidden, rest) = tile.split_at(Axis(1), neurons);
         let (targets, ones) = rest.split_at(Axis(1), self.beta.len());
@@ -298,13 +338,13 @@ impl Light {
         leverages.mapv_inplace(|h| h * (2.0 - h) / ((1.0 - h) * (1.0 - h)));
         // What is not a number is heavy, too.
         let heavy: Vec<usize> = (0..most.len())
-            .filter(|&row| !(0.0..=LIGHT).contains(&most[row]))
+            .filter(|&row| !(0.0..=self.limit).contains(&most[row]))
             .collect();
         for &row in &heavy {
             leverages.row_mut(row).fill(0.0);
         }
         let outputs = targets.columns().into_iter().zip(&self.beta);
-        for ((targets, beta), mut sums) in outputs.zip(self.sums.columns_mut()) {
+        for ((targets, beta), mut sums) in outputs.zip(sums.columns_mut()) {
             let fitted = f32::product(hidden.view(), beta.view());
             for ((fitted, added), &target) in
                 fitted.rows().into_iter().zip(leverages.rows()).zip(targets)
@@ -350,8 +390,9 @@ fn scores_of_close_rows<A: Scalar>(
     let extra = usize::from(intercept);
     let (ones, others) = r.view().split_at(Axis(1), extra);
     let mut own = Array2::zeros((close.len(), neurons + outputs + extra));
+    let mut memory = tiles.memory();
     for (mut to, &row) in own.rows_mut().into_iter().zip(close) {
-        to.assign(&tiles.tile(row..row + 1, mean)?.row(0));
+        to.assign(&tiles.tile(row..row + 1, mean, &mut memory)?.row(0));
     }
     let (own_hidden, rest) = own.view().split_at(Axis(1), neurons);
     let (own_targets, own_ones) = rest.split_at(Axis(1), outputs);

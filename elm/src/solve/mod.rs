@@ -269,7 +269,7 @@ impl Solver {
     /// takes the matrix itself.
     pub(crate) fn solve_rows<A: Scalar>(
         &self,
-        source: &mut RowSource<'_, A>,
+        source: &RowSource<'_, A>,
     ) -> Result<Option<Solution<A>>> {
         match self {
             Self::Ridge(solver) => solver.solve_rows(source)?,

@@ -11,8 +11,9 @@ use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, ShapeBuilder, s};
 
 use super::equilibration::{Equilibration, magnitudes, weighted_magnitudes};
 use crate::error::Result;
-use crate::feature_map::FeatureRows;
+use crate::feature_map::{FeatureRows, TileBuffers};
 use crate::scalar::{Scalar, power_of_two};
+use crate::threads;
 
 /// Where the rows of a hidden-layer matrix come from.
 pub(crate) enum HiddenRows<'a, A: Scalar> {
@@ -60,17 +61,27 @@ impl<A: Scalar> HiddenRows<'_, A> {
         }
     }
 
-    /// Writes rows divided by `scale`, less `shift`.
+    /// Working memory for [`write`](Self::write).
+    pub(super) fn buffers(&self) -> Option<TileBuffers<A>> {
+        match self {
+            Self::Map(layer) => Some(layer.buffers()),
+            Self::Matrix(_) => None,
+        }
+    }
+
+    /// Writes rows divided by `scale`, less `shift`, each to the beginning of a line of `stride` values.
     pub(super) fn write(
-        &mut self,
+        &self,
         rows: Range<usize>,
-        scale: A,
-        shift: &[A],
-        to: &mut [A],
-        stride: usize,
+        (scale, shift): (A, &[A]),
+        (to, stride): (&mut [A], usize),
+        buffers: &mut Option<TileBuffers<A>>,
     ) -> Result<()> {
         match self {
-            Self::Map(layer) => layer.write(rows, shift, to, stride)?,
+            Self::Map(layer) => {
+                let buffers = buffers.get_or_insert_with(|| layer.buffers());
+                layer.write(rows, shift, (to, stride), buffers)?;
+            }
             Self::Matrix(matrix) => {
                 let rows = matrix.slice(s![rows, ..]);
                 for (row, to) in rows.rows().into_iter().zip(to.chunks_mut(stride)) {
@@ -122,20 +133,32 @@ impl<A: Scalar> RowSource<'_, A> {
         rows.clamp(64, 1024).min(self.rows())
     }
 
+    /// Parts of the rows whose sums are taken by themselves, on whatever thread, and then added in their
+    /// order.
+    pub(super) fn parts(&self) -> Vec<Range<usize>> {
+        /// Parts of so many rows cost far more than adding their sums does.
+        const ROWS: usize = 1024;
+        const MOST: usize = 16;
+        /// Numbers in the sums of all parts.
+        const ROOM: usize = 1 << 24;
+        let room = ROOM / self.width().saturating_mul(self.width()).max(1);
+        threads::split(self.rows(), (self.rows() / ROWS).min(MOST).min(room))
+    }
+
     /// Writes a tile: rows divided by their scales and less `shift`, all times the root of the
     /// row's weight. A row of weight 0 may hold anything, even what overflows; it becomes 0.
     fn write(
-        &mut self,
+        &self,
         rows: Range<usize>,
-        frame: &Equilibration<A>,
-        shift: &[A],
+        (frame, shift): (&Equilibration<A>, &[A]),
         to: &mut [A],
+        buffers: &mut Option<TileBuffers<A>>,
     ) -> Result<()> {
         let (neurons, width) = (self.neurons(), self.width());
         let (hidden_shift, target_shift) = shift.split_at(neurons);
         let scale = frame.hidden_scale;
         self.hidden
-            .write(rows.clone(), scale, hidden_shift, to, width)?;
+            .write(rows.clone(), (scale, hidden_shift), (to, width), buffers)?;
         let targets = self.targets.slice(s![rows.clone(), ..]);
         let roots = frame.root_weights.slice(s![rows]);
         for ((to, targets), &root) in to.chunks_exact_mut(width).zip(targets.rows()).zip(roots) {
@@ -185,7 +208,7 @@ impl<A: Scalar> NormalEquations<A> {
     ///
     /// # Errors
     /// Those of making the rows.
-    pub(crate) fn gather(source: &mut RowSource<'_, A>) -> Result<Self> {
+    pub(crate) fn gather(source: &RowSource<'_, A>) -> Result<Self> {
         let (rows, neurons, outputs) = (source.rows(), source.neurons(), source.outputs());
         let mut frame = Equilibration::of_weights(rows, source.weights.as_ref(), source.intercept);
         frame.target_scale =
@@ -195,38 +218,51 @@ impl<A: Scalar> NormalEquations<A> {
         frame.target_mean = Array1::zeros(outputs);
 
         let (width, tile_rows) = (source.width(), source.tile_rows());
-        let mut tile = vec![A::zero(); tile_rows * width];
         let mut shift = vec![A::zero(); neurons + outputs];
-        let mut sums = Array2::zeros((width, width).f());
-        let mut scratch = Vec::new();
-        if source.intercept && rows > tile_rows {
-            // Of rows from everywhere, as the first may be unlike the rest.
-            let mut roots = Vec::with_capacity(SAMPLE);
-            for run in spread_runs(rows, SAMPLE.min(tile_rows)) {
-                let to = &mut tile[roots.len() * width..][..run.len() * width];
-                source.write(run.clone(), &frame, &shift, to)?;
-                roots.extend(frame.root_weights.slice(s![run]));
-            }
-            shift = center_of(&tile, width, &Array1::from(roots));
-        }
-        for first in (0..rows).step_by(tile_rows) {
-            let range = first..rows.min(first + tile_rows);
-            let tile = &mut tile[..range.len() * width];
-            source.write(range, &frame, &shift, tile)?;
-            if source.intercept && rows <= tile_rows {
-                // All rows are here: made once, shifted now.
-                let roots = &frame.root_weights;
-                shift = center_of(tile, width, roots);
-                for (row, &root) in tile.chunks_exact_mut(width).zip(roots) {
-                    for (value, &shift) in row.iter_mut().zip(&shift) {
-                        *value -= shift * root;
-                    }
+        if source.intercept && rows <= tile_rows {
+            // All rows at once: made once, and shifted then.
+            let mut tile = vec![A::zero(); rows * width];
+            source.write(0..rows, (&frame, &shift), &mut tile, &mut None)?;
+            let roots = &frame.root_weights;
+            shift = center_of(&tile, width, roots);
+            for (row, &root) in tile.chunks_exact_mut(width).zip(roots) {
+                for (value, &shift) in row.iter_mut().zip(&shift) {
+                    *value -= shift * root;
                 }
             }
-            if let Ok(tile) = ArrayView2::from_shape((tile.len() / width, width), tile) {
-                A::add_gram(tile, &mut sums, &mut scratch);
+            let mut sums = Array2::zeros((width, width).f());
+            if let Ok(tile) = ArrayView2::from_shape((rows, width), &tile) {
+                A::add_gram(tile, &mut sums, &mut Vec::new());
             }
+            return Ok(Self::of_sums(&sums, frame, shift));
         }
+        if source.intercept {
+            // Of rows from everywhere, as the first may be unlike the rest.
+            let mut sample = vec![A::zero(); SAMPLE.min(tile_rows) * width];
+            let mut roots = Vec::with_capacity(SAMPLE);
+            let mut buffers = source.hidden.buffers();
+            for run in spread_runs(rows, SAMPLE.min(tile_rows)) {
+                let to = &mut sample[roots.len() * width..][..run.len() * width];
+                source.write(run.clone(), (&frame, &shift), to, &mut buffers)?;
+                roots.extend(frame.root_weights.slice(s![run]));
+            }
+            shift = center_of(&sample, width, &Array1::from(roots));
+        }
+        let sums_of = |part: Range<usize>| {
+            let mut tile = vec![A::zero(); tile_rows * width];
+            let mut sums = Array2::zeros((width, width).f());
+            let (mut buffers, mut scratch) = (source.hidden.buffers(), Vec::new());
+            for range in runs(part, tile_rows) {
+                let tile = &mut tile[..range.len() * width];
+                source.write(range, (&frame, &shift), tile, &mut buffers)?;
+                if let Ok(tile) = ArrayView2::from_shape((tile.len() / width, width), tile) {
+                    A::add_gram(tile, &mut sums, &mut scratch);
+                }
+            }
+            Ok(sums)
+        };
+        let sums = threads::reduce(source.parts(), sums_of, |sums, part| *sums += &part)?;
+        let sums = sums.unwrap_or_else(|| Array2::zeros((width, width).f()));
         Ok(Self::of_sums(&sums, frame, shift))
     }
 
@@ -290,13 +326,11 @@ impl<A: Scalar> NormalEquations<A> {
     /// Those of making the rows.
     pub(crate) fn residual_squares(
         &self,
-        source: &mut RowSource<'_, A>,
+        source: &RowSource<'_, A>,
         beta: &Array2<A>,
     ) -> Result<Array1<A>> {
-        let (rows, neurons, outputs) = (source.rows(), source.neurons(), source.outputs());
+        let (neurons, outputs) = (source.neurons(), source.outputs());
         let (width, tile_rows) = (source.width(), source.tile_rows());
-        let mut tile = vec![A::zero(); tile_rows * width];
-        let mut squares = Array1::zeros(outputs);
         // What the shifted rows are still short of being centered.
         let scaled = &self.frame.target_mean / &self.frame.target_scale;
         let constant = if self.frame.intercept {
@@ -306,29 +340,41 @@ impl<A: Scalar> NormalEquations<A> {
         } else {
             Array1::zeros(outputs)
         };
-        for first in (0..rows).step_by(tile_rows) {
-            let range = first..rows.min(first + tile_rows);
-            let tile = &mut tile[..range.len() * width];
-            source.write(range.clone(), &self.frame, &self.shift, tile)?;
-            let Ok(tile) = ArrayView2::from_shape((range.len(), width), tile) else {
-                continue;
-            };
-            let fitted = A::product(tile.slice(s![.., ..neurons]), beta.view());
-            let targets = tile.slice(s![.., neurons..neurons + outputs]);
-            let roots = self.frame.root_weights.slice(s![range]);
-            for ((fitted, targets), &root) in
-                fitted.rows().into_iter().zip(targets.rows()).zip(roots)
-            {
-                for (((sum, &f), &t), &c) in
-                    squares.iter_mut().zip(fitted).zip(targets).zip(&constant)
-                {
-                    let rest = t - f - c * root;
-                    *sum += rest * rest;
+        let squares_of = |part: Range<usize>| {
+            let mut tile = vec![A::zero(); tile_rows * width];
+            let mut squares = Array1::zeros(outputs);
+            let mut buffers = source.hidden.buffers();
+            for range in runs(part, tile_rows) {
+                let tile = &mut tile[..range.len() * width];
+                let place = (&self.frame, self.shift.as_slice());
+                source.write(range.clone(), place, tile, &mut buffers)?;
+                let Ok(tile) = ArrayView2::from_shape((range.len(), width), tile) else {
+                    continue;
+                };
+                let fitted = A::product(tile.slice(s![.., ..neurons]), beta.view());
+                let targets = tile.slice(s![.., neurons..neurons + outputs]);
+                let roots = self.frame.root_weights.slice(s![range]);
+                let rows = fitted.rows().into_iter().zip(targets.rows()).zip(roots);
+                for ((fitted, targets), &root) in rows {
+                    let columns = squares.iter_mut().zip(fitted).zip(targets).zip(&constant);
+                    for (((sum, &f), &t), &c) in columns {
+                        let rest = t - f - c * root;
+                        *sum += rest * rest;
+                    }
                 }
             }
-        }
-        Ok(squares)
+            Ok(squares)
+        };
+        let squares = threads::reduce(source.parts(), squares_of, |sum, part| *sum += &part)?;
+        Ok(squares.unwrap_or_else(|| Array1::zeros(outputs)))
     }
+}
+
+/// Ranges of up to `length` rows, from the first to the last of `rows`.
+pub(super) fn runs(rows: Range<usize>, length: usize) -> impl Iterator<Item = Range<usize>> {
+    let end = rows.end;
+    rows.step_by(length)
+        .map(move |first| first..end.min(first + length))
 }
 
 /// About `wanted` of `rows` rows, as runs of equal length spread evenly from first to last.
@@ -394,13 +440,13 @@ mod tests {
         let hidden = Array2::from_shape_fn((rows, 3), |(row, j)| (place(row) + j as f64).sin());
         let targets = Array2::from_shape_fn((rows, 1), |(row, _)| place(row));
         let weights = Array1::from_shape_fn(rows, |row| 1000.0_f64.powf(place(row)));
-        let mut source = RowSource {
+        let source = RowSource {
             hidden: HiddenRows::Matrix(hidden.view()),
             targets: targets.view(),
             weights: Some(weights.view()),
             intercept: true,
         };
-        let moments = NormalEquations::gather(&mut source).unwrap();
+        let moments = NormalEquations::gather(&source).unwrap();
         let largest = moments.gram.diag().fold(0.0, |m: f64, &d| m.max(d));
         assert!(moments.correction < 0.01 * largest);
     }

@@ -78,7 +78,7 @@ impl PseudoInverse {
     }
 
     pub(super) fn solve<A: Scalar>(self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
-        if let Some(solution) = self.solve_rows(&mut problem.row_source())? {
+        if let Some(solution) = self.solve_rows(&problem.row_source())? {
             return Ok(solution);
         }
         let prepared = EquilibratedProblem::new(problem);
@@ -102,7 +102,7 @@ impl PseudoInverse {
     /// the neurons.
     pub(super) fn solve_rows<A: Scalar>(
         self,
-        source: &mut RowSource<'_, A>,
+        source: &RowSource<'_, A>,
     ) -> Result<Option<Solution<A>>> {
         if !tiles::worthwhile(source.rows(), source.neurons()) {
             return Ok(None);

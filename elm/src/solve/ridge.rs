@@ -148,7 +148,7 @@ impl Ridge {
     }
 
     pub(super) fn solve<A: Scalar>(self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
-        if let Some(solution) = self.solve_rows(&mut problem.row_source())? {
+        if let Some(solution) = self.solve_rows(&problem.row_source())? {
             return Ok(solution);
         }
         match self.lambda {
@@ -181,7 +181,7 @@ impl Ridge {
     /// many more rows than neurons.
     pub(super) fn solve_rows<A: Scalar>(
         self,
-        source: &mut RowSource<'_, A>,
+        source: &RowSource<'_, A>,
     ) -> Result<Option<Solution<A>>> {
         if let Lambda::Relative(lambda) = self.lambda
             && gram::allowed::<A>(lambda)

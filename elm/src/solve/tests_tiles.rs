@@ -71,8 +71,8 @@ impl<A: Scalar> Problem<A> {
     }
 
     fn by_tiles(&self, ridge: Ridge) -> Solution<f64> {
-        let mut source = self.source();
-        let mut tiles = Tiles::new(&mut source).unwrap().unwrap();
+        let source = self.source();
+        let mut tiles = Tiles::new(&source).unwrap().unwrap();
         let roundoff = A::epsilon().as_f64() / 2.0;
         ridge.search_tiles(&mut tiles, roundoff).unwrap().unwrap()
     }
@@ -308,8 +308,8 @@ fn the_triangle_serves_the_pseudo_inverse_and_weak_strengths() {
         let problem = Problem::new(hidden, 2, 0.3);
         let whole = LeastSquares::new(&problem.hidden, &problem.targets).unwrap();
         let whole = whole.with_intercept(true);
-        let mut source = problem.source();
-        let mut tiles = Tiles::new(&mut source).unwrap().unwrap();
+        let source = problem.source();
+        let mut tiles = Tiles::new(&source).unwrap().unwrap();
         let (triangle, frame) = tiles.centered_triangle().unwrap().unwrap();
         let solver = PseudoInverse::default();
         let tiles = solver.solve_centered(triangle, frame).unwrap();

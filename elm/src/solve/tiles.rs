@@ -12,16 +12,18 @@ use super::Route;
 use super::design_svd::DesignSvd;
 use super::equilibration::{Equilibration, magnitudes};
 use super::gram;
-use super::normal_equations::{NormalEquations, RowSource, center_of, spread_runs};
+use super::normal_equations::{NormalEquations, RowSource, center_of, runs, spread_runs};
 use crate::error::Result;
-use crate::linalg::{Backend, QrFactor, Svd};
+use crate::feature_map::TileBuffers;
+use crate::linalg::{Backend, Eigen, QrFactor};
 use crate::scalar::{Scalar, power_of_two};
+use crate::threads;
 
 /// Rows for each column below which a problem is answered from its matrix, which costs no second
 /// look at the rows, and is factorized as accurately as it can be.
 const ROWS_PER_COLUMN: usize = 16;
 /// Entries of a hidden-layer matrix that is small enough to be there.
-const SMALL: usize = 1 << 22;
+const SMALL: usize = 1 << 20;
 
 /// Whether a problem of this shape is answered a tile at a time.
 pub(super) fn worthwhile(rows: usize, columns: usize) -> bool {
@@ -44,12 +46,17 @@ const TILE_BYTES: usize = 1 << 20;
 
 /// The rows of a problem in `f64`: weighted, divided by powers of two, and less a shift.
 pub(super) struct Tiles<'s, 'a, A: Scalar> {
-    source: &'s mut RowSource<'a, A>,
+    source: &'s RowSource<'a, A>,
     /// Without means until they are known.
     pub(super) frame: Equilibration<f64>,
     /// Of hidden values and targets, in units of their scale: near the means, for a column that is
     /// constant its value. 0 without an intercept.
     shift: Vec<f64>,
+}
+
+/// Working memory for a tile of rows, and its result.
+pub(super) struct TileMemory<A: Scalar> {
+    buffers: Option<TileBuffers<A>>,
     narrow: Vec<A>,
     wide: Array2<f64>,
 }
@@ -59,7 +66,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     ///
     /// # Errors
     /// Those of making the rows.
-    pub(super) fn new(source: &'s mut RowSource<'a, A>) -> Result<Option<Self>> {
+    pub(super) fn new(source: &'s RowSource<'a, A>) -> Result<Option<Self>> {
         let weights = source.weights.map(A::widen);
         let weights = weights.as_ref().map(|weights| weights.view());
         let mut frame =
@@ -77,8 +84,6 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
             source,
             frame,
             shift,
-            narrow: Vec::new(),
-            wide: Array2::zeros((0, 0)),
         }))
     }
 
@@ -94,13 +99,23 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         self.source.outputs()
     }
 
-    /// Ranges of rows, from the first to the last, each of a tile.
-    pub(super) fn ranges(&self) -> impl Iterator<Item = Range<usize>> + use<A> {
-        let rows = self.rows();
+    pub(super) fn memory(&self) -> TileMemory<A> {
+        TileMemory {
+            buffers: self.source.hidden.buffers(),
+            narrow: Vec::new(),
+            wide: Array2::zeros((0, 0)),
+        }
+    }
+
+    /// Parts of the rows, for a thread each.
+    pub(super) fn parts(&self) -> Vec<Range<usize>> {
+        self.source.parts()
+    }
+
+    /// Ranges of these rows, from the first to the last, each of a tile.
+    pub(super) fn ranges(&self, rows: Range<usize>) -> impl Iterator<Item = Range<usize>> + use<A> {
         let step = (TILE_BYTES / size_of::<f64>() / self.source.width()).clamp(64, 1024);
-        (0..rows)
-            .step_by(step)
-            .map(move |first| first..rows.min(first + step))
+        runs(rows, step)
     }
 
     /// Whether any of these rows has a weight.
@@ -114,27 +129,34 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     ///
     /// # Errors
     /// Those of making the rows.
-    pub(super) fn tile(
-        &mut self,
+    pub(super) fn tile<'m>(
+        &self,
         rows: Range<usize>,
         shift: &[f64],
-    ) -> Result<ArrayView2<'_, f64>> {
+        memory: &'m mut TileMemory<A>,
+    ) -> Result<ArrayView2<'m, f64>> {
         let (neurons, width) = (self.neurons(), self.source.width());
-        self.narrow.resize(rows.len() * neurons, A::zero());
-        if self.wide.nrows() < rows.len() {
-            self.wide = Array2::zeros((rows.len(), width));
+        let TileMemory {
+            buffers,
+            narrow,
+            wide,
+        } = memory;
+        narrow.resize(rows.len() * neurons, A::zero());
+        if wide.nrows() < rows.len() {
+            *wide = Array2::zeros((rows.len(), width));
         }
         let none = vec![A::zero(); neurons];
         let scale = A::from_f64(self.frame.hidden_scale);
+        let to = (narrow.as_mut_slice(), neurons);
         self.source
             .hidden
-            .write(rows.clone(), scale, &none, &mut self.narrow, neurons)?;
+            .write(rows.clone(), (scale, &none), to, buffers)?;
         let (hidden_shift, target_shift) = shift.split_at(neurons);
         let targets = self.source.targets.slice(s![rows.clone(), ..]);
         let roots = self.frame.root_weights.slice(s![rows.clone()]);
-        let wide = self.wide.as_slice_mut().unwrap_or(&mut []);
-        let lines = wide.chunks_exact_mut(width);
-        let values = self.narrow.chunks_exact(neurons).zip(targets.rows());
+        let lines = wide.as_slice_mut().unwrap_or(&mut []);
+        let lines = lines.chunks_exact_mut(width);
+        let values = narrow.chunks_exact(neurons).zip(targets.rows());
         for ((to, (hidden, targets)), &root) in lines.zip(values).zip(roots) {
             if root == 0.0 {
                 to.fill(0.0);
@@ -159,7 +181,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
                 to.iter_mut().for_each(|value| *value *= root);
             }
         }
-        Ok(self.wide.slice(s![..rows.len(), ..]))
+        Ok(wide.slice(s![..rows.len(), ..]))
     }
 
     /// Looks at rows from everywhere: sets the shift, and says whether the sums of products may do.
@@ -172,9 +194,10 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         let mut sample = Vec::with_capacity(wanted * width);
         let mut roots = Vec::with_capacity(wanted);
         let zeros = vec![0.0; self.shift.len()];
+        let mut memory = self.memory();
         for run in spread_runs(self.rows(), wanted) {
             roots.extend(self.frame.root_weights.slice(s![run.clone()]));
-            sample.extend(self.tile(run, &zeros)?);
+            sample.extend(self.tile(run, &zeros, &mut memory)?);
         }
         let roots = Array1::from(roots);
         if self.frame.intercept {
@@ -232,26 +255,29 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
 
     /// By the singular values of the sums of products, where those are well enough conditioned and
     /// the targets not explained down to where sums of squares have no digits.
-    fn spectrum_of_products(&mut self) -> Result<Option<DesignSvd<f64>>> {
+    fn spectrum_of_products(&self) -> Result<Option<DesignSvd<f64>>> {
         /// The least share of the targets' squares that must be left.
         const UNEXPLAINED: f64 = 1e-6;
         let width = self.source.width();
-        let mut sums = Array2::zeros((width, width).f());
-        let mut scratch = Vec::new();
-        let shift = std::mem::take(&mut self.shift);
-        for range in self.ranges() {
-            if !self.is_empty(range.clone()) {
-                f64::add_gram(self.tile(range, &shift)?, &mut sums, &mut scratch);
+        let sums_of = |part: Range<usize>| {
+            let mut sums = Array2::zeros((width, width).f());
+            let (mut memory, mut scratch) = (self.memory(), Vec::new());
+            for range in self.ranges(part) {
+                if !self.is_empty(range.clone()) {
+                    let tile = self.tile(range, &self.shift, &mut memory)?;
+                    f64::add_gram(tile, &mut sums, &mut scratch);
+                }
             }
-        }
-        let moments = NormalEquations::of_sums(&sums, self.frame.clone(), shift.clone());
-        self.shift = shift;
+            Ok(sums)
+        };
+        let sums = threads::reduce(self.parts(), sums_of, |sums, part| *sums += &part)?;
+        let sums = sums.unwrap_or_else(|| Array2::zeros((width, width).f()));
+        let moments = NormalEquations::of_sums(&sums, self.frame.clone(), self.shift.clone());
         if !moments.in_range() {
             return Ok(None);
         }
-        let lower = &moments.gram;
-        let gram = Array2::from_shape_fn(lower.dim(), |(i, j)| lower[[i.max(j), i.min(j)]]);
-        let Svd { s, vt, .. } = f64::svd(gram.view())?;
+        let gram = &moments.gram;
+        let Eigen { values: s, vt } = f64::eigen(gram.view())?;
         let (Some(&largest), Some(&smallest)) = (s.first(), s.last()) else {
             return Ok(None);
         };
@@ -303,29 +329,36 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     }
 
     /// The triangle of the centered rows, and their means.
-    fn triangle(&mut self) -> Result<Option<(QrFactor<f64>, Equilibration<f64>)>> {
-        let shift = std::mem::take(&mut self.shift);
-        let all = self.stacked(&shift)?;
-        let triangle = self.centered(all, &shift);
-        self.shift = shift;
-        Ok(triangle)
+    fn triangle(&self) -> Result<Option<(QrFactor<f64>, Equilibration<f64>)>> {
+        Ok(self.centered(self.stacked(&self.shift)?, &self.shift))
     }
 
     /// The triangle of the rows, block after block (sequential TSQR: Demmel, Grigori, Hoemmen and
     /// Langou, Communication-optimal parallel and sequential QR, 2012). Eliminating the column of
     /// ones first centers the rest.
-    fn stacked(&mut self, shift: &[f64]) -> Result<QrFactor<f64>> {
+    fn stacked(&self, shift: &[f64]) -> Result<QrFactor<f64>> {
         let (neurons, outputs) = (self.neurons(), self.outputs());
         let columns = usize::from(self.frame.intercept) + neurons;
         let mut stack = Stack::new(columns, outputs, BLOCK * columns);
-        for range in self.ranges() {
-            if self.is_empty(range.clone()) {
-                continue;
+        // Made by several threads, a block at a time, and factorized in their order.
+        let ranges: Vec<_> = self.ranges(0..self.rows()).collect();
+        let block = stack
+            .room()
+            .div_ceil(ranges.first().map_or(1, ExactSizeIterator::len));
+        for ranges in ranges.chunks(block.max(1)) {
+            let tile_of = |memory: &mut TileMemory<A>, range: &Range<usize>| -> Result<_> {
+                if self.is_empty(range.clone()) {
+                    return Ok(None);
+                }
+                let tile = self.tile(range.clone(), shift, memory)?;
+                Ok(Some(tile.to_owned()))
+            };
+            for tile in threads::map_with(ranges.iter().collect(), || self.memory(), tile_of) {
+                let Some(tile) = tile? else { continue };
+                let (hidden, rest) = tile.view().split_at(Axis(1), neurons);
+                let (targets, ones) = rest.split_at(Axis(1), outputs);
+                stack.push(ones, hidden, targets)?;
             }
-            let tile = self.tile(range, shift)?;
-            let (hidden, rest) = tile.split_at(Axis(1), neurons);
-            let (targets, ones) = rest.split_at(Axis(1), outputs);
-            stack.push(ones, hidden, targets)?;
         }
         stack.finish()
     }
@@ -403,6 +436,11 @@ impl Stack {
             residual_ss: Array1::zeros(outputs),
             filled: columns,
         }
+    }
+
+    /// Rows of a block.
+    fn room(&self) -> usize {
+        self.hidden.nrows() - self.hidden.ncols()
     }
 
     fn push(

@@ -14,6 +14,7 @@ use crate::model::ElmParams;
 use crate::scalar::Scalar;
 use crate::stats::Moments;
 use crate::stream::Stream;
+use crate::threads;
 
 /// Rows under which the learned metric fits noise.
 pub(super) const FEWEST_ROWS: usize = 60;
@@ -132,6 +133,21 @@ fn narrow<A: Scalar>(embedding: Embedding<f64>) -> Result<Embedding<A>> {
 /// The rounds of a path, each with the squared errors of the rows that it did not see.
 type Rounds = Vec<(Round, Array1<f64>)>;
 
+/// A path, walked.
+struct Walked {
+    found: Rounds,
+    trials: Vec<Trial>,
+    /// Layers tried.
+    spent: usize,
+}
+
+/// The rows that are not `held`.
+fn others(rows: usize, held: &[usize]) -> Vec<usize> {
+    let mut is_held = vec![false; rows];
+    held.iter().for_each(|&row| is_held[row] = true);
+    (0..rows).filter(|&row| !is_held[row]).collect()
+}
+
 struct FullSearch {
     plain: Seen,
     embedded: Seen,
@@ -160,6 +176,8 @@ impl FullSearch {
         } else {
             vec![order[..rows / 4].to_vec()]
         };
+        let ahead = self.look_ahead(&folds);
+        let mut ahead = ahead.into_iter();
         let mut best: Option<Candidate> = None;
         for ramps in [false, true] {
             if ramps && !self.embedded.has_ramps() {
@@ -167,10 +185,10 @@ impl FullSearch {
             }
             let mut errors: Vec<(f64, usize)> = Vec::new();
             for held in &folds {
-                let mut is_held = vec![false; rows];
-                held.iter().for_each(|&row| is_held[row] = true);
-                let kept: Vec<usize> = (0..rows).filter(|&row| !is_held[row]).collect();
-                let found = self.path(ramps, kept, self.rounds, held)?;
+                let found = match ahead.next() {
+                    Some(path) => self.take(path, ramps, held)?,
+                    None => self.path(ramps, others(rows, held), self.rounds, held)?,
+                };
                 let Some(found) = found else { break };
                 for (round, (_, squares)) in found.iter().enumerate() {
                     let mean = self.mean(held, squares);
@@ -202,6 +220,53 @@ impl FullSearch {
         })
     }
 
+    /// Walks the paths of [`candidates`](Self::candidates) on several threads, each as if it were the
+    /// first; none where there is one thread.
+    fn look_ahead(&self, folds: &[Vec<usize>]) -> Vec<Result<Walked>> {
+        if threads::current_threads() == 1 {
+            return Vec::new();
+        }
+        let rows = self.plain.x.nrows();
+        let structures = [false, true].into_iter();
+        let structures = structures.filter(|ramps| !ramps || self.embedded.has_ramps());
+        let paths = structures.flat_map(|ramps| folds.iter().map(move |held| (ramps, held)));
+        threads::map(paths.collect(), |(ramps, held): (bool, &Vec<usize>)| {
+            self.walk(ramps, others(rows, held), self.rounds, held)
+        })
+    }
+
+    /// A path that was walked ahead; again with what is left of the budget where it took more than that.
+    fn take(
+        &mut self,
+        path: Result<Walked>,
+        ramps: bool,
+        held: &[usize],
+    ) -> Result<Option<Rounds>> {
+        match path {
+            Ok(path) if path.spent <= self.left => Ok(Some(self.record(path))),
+            _ => {
+                let rows = self.plain.x.nrows();
+                self.path(ramps, others(rows, held), self.rounds, held)
+            }
+        }
+    }
+
+    fn walk(&self, ramps: bool, kept: Vec<usize>, rounds: usize, held: &[usize]) -> Result<Walked> {
+        let mut path = Path::new(self.seen(ramps), kept, self.neurons, self.left)?;
+        let found = path.run(rounds, held)?;
+        Ok(Walked {
+            found,
+            spent: self.left - path.left,
+            trials: path.trials,
+        })
+    }
+
+    fn record(&mut self, path: Walked) -> Rounds {
+        self.left = self.left.saturating_sub(path.trials.len());
+        self.trials.extend(path.trials);
+        path.found
+    }
+
     /// A path, or nothing once the budget is spent.
     fn path(
         &mut self,
@@ -213,13 +278,8 @@ impl FullSearch {
         if self.left == 0 {
             return Ok(None);
         }
-        let seen = if ramps { &self.embedded } else { &self.plain };
-        let mut path = Path::new(seen, kept, self.neurons, self.left)?;
-        let found = path.run(rounds, held)?;
-        let trials = path.trials;
-        self.left = self.left.saturating_sub(trials.len());
-        self.trials.extend(trials);
-        Ok(Some(found))
+        let walked = self.walk(ramps, kept, rounds, held)?;
+        Ok(Some(self.record(walked)))
     }
 
     fn mean(&self, held: &[usize], squares: &Array1<f64>) -> f64 {

@@ -64,7 +64,7 @@ pub(super) struct Path<'a> {
     columns: SharedColumns,
     neurons: usize,
     /// Layers that may still be solved.
-    left: usize,
+    pub(super) left: usize,
     pub(super) trials: Vec<Trial>,
 }
 

@@ -1,5 +1,7 @@
 //! The tuner's search: fits candidates, and decides which to try next.
 
+use std::collections::HashMap;
+
 use ndarray::{Array1, Array2, ArrayView2, Axis, Ix2};
 
 use super::rows::{chosen_rows, deviation};
@@ -9,6 +11,7 @@ use crate::dataset::{Dataset, Rows, TargetDim};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 use crate::solve::Ridge;
+use crate::threads;
 
 /// Neurons that the search uses as long as their number is not chosen.
 const SEARCH_NEURONS: usize = 100;
@@ -58,6 +61,15 @@ impl Attempt {
     }
 }
 
+/// What is tried: neurons, exponent of the scale, scales of inputs, direct links; numbers by their bits.
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct Setting {
+    neurons: usize,
+    exponent: u64,
+    scales: Vec<u64>,
+    links: bool,
+}
+
 /// A search under way.
 pub(super) struct Search<'a, A: Scalar> {
     tuner: &'a Tuner<A>,
@@ -69,6 +81,8 @@ pub(super) struct Search<'a, A: Scalar> {
     spread: Vec<f64>,
     folds: Option<Vec<usize>>,
     attempts: Vec<Attempt>,
+    /// Tried on other threads before it was known whether they would be wanted.
+    ahead: HashMap<Setting, Result<Attempt>>,
     /// Index of the setting that the search stands at.
     current: usize,
     /// Bounds of the scale's exponent: beyond, every neuron is a straight line or a step.
@@ -126,6 +140,7 @@ impl<'a, A: Scalar> Search<'a, A> {
             weights,
             folds,
             attempts: Vec::new(),
+            ahead: HashMap::new(),
             current: 0,
             exponents: (center - 3.0 * COARSE, center + 3.0 * COARSE),
             spent: 0,
@@ -164,8 +179,9 @@ impl<'a, A: Scalar> Search<'a, A> {
         }
         let center = (self.exponents.0 + self.exponents.1) / 2.0;
         // From the middle outwards, so that a small budget is spent well.
-        for step in [0, 1, -1, 2, -2, 3, -3] {
-            let exponent = center + COARSE * f64::from(step);
+        let exponents = [0, 1, -1, 2, -2, 3, -3].map(|step| center + COARSE * f64::from(step));
+        self.look_ahead(exponents.map(|exponent| (neurons, exponent, Vec::new())));
+        for exponent in exponents {
             self.move_if(neurons, exponent, &[], scale_pays)?;
         }
         self.refine_scale(COARSE / 2.0, MIN_STEP)?;
@@ -202,6 +218,10 @@ impl<'a, A: Scalar> Search<'a, A> {
             return Ok(());
         };
         let (mut neurons, mut misses) = (start.neurons, 0);
+        // Two are tried in any case.
+        let doubled = [2, 4].map(|times| (times * start.neurons).min(most));
+        let exponent = start.scale.log10();
+        self.look_ahead(doubled.map(|neurons| (neurons, exponent, start.input_scales.clone())));
         while neurons < most && misses < 2 {
             // What is left to the most is not worth a step of its own unless it is half as many again.
             if 3 * neurons > 2 * most {
@@ -242,9 +262,10 @@ impl<'a, A: Scalar> Search<'a, A> {
                 break;
             };
             let mut moved = false;
-            for power in [1.0, 0.5] {
-                let scales = proportional(&slopes, power);
-                let exponent = now.scale.log10();
+            let exponent = now.scale.log10();
+            let both = [1.0, 0.5].map(|power| proportional(&slopes, power));
+            self.look_ahead(both.clone().map(|scales| (now.neurons, exponent, scales)));
+            for scales in both {
                 moved |= self.move_if(now.neurons, exponent, &scales, |new, old| {
                     new.improves_on(old, 1.0 + penalty)
                 })?;
@@ -282,14 +303,16 @@ impl<'a, A: Scalar> Search<'a, A> {
     fn refine_scale(&mut self, mut step: f64, finest: f64) -> Result<()> {
         while step >= finest && !self.is_spent() {
             let mut moved = false;
-            for direction in [1.0, -1.0] {
-                let Some(now) = self.now() else {
-                    return Ok(());
-                };
-                let exponent = now.scale.log10() + direction * step;
-                if exponent < self.exponents.0 || exponent > self.exponents.1 {
-                    continue;
-                }
+            let Some(now) = self.now() else {
+                return Ok(());
+            };
+            let within = self.exponents.0..=self.exponents.1;
+            let exponents = [1.0, -1.0].map(|direction| now.scale.log10() + direction * step);
+            let exponents = exponents.into_iter().filter(|e| within.contains(e));
+            let exponents: Vec<f64> = exponents.collect();
+            let ahead = exponents.iter();
+            self.look_ahead(ahead.map(|&e| (now.neurons, e, now.input_scales.clone())));
+            for exponent in exponents {
                 if self.move_if(now.neurons, exponent, &now.input_scales, step_pays)? {
                     moved = true;
                     break;
@@ -313,15 +336,28 @@ impl<'a, A: Scalar> Search<'a, A> {
         let mut step = 2.0 * COARSE;
         while step >= MIN_STEP && !self.is_spent() {
             let mut moved = false;
-            for &input in &order {
+            for (place, &input) in order.iter().enumerate() {
                 for direction in [-1.0, 1.0] {
                     let Some(now) = self.now() else {
                         return Ok(());
                     };
-                    let mut scales = now.input_scales.clone();
-                    scales.resize(self.x.ncols(), 1.0);
-                    scales[input] *= 10.0_f64.powf(direction * step);
+                    let columns = self.x.ncols();
+                    let turned = |input: usize, direction: f64| {
+                        let mut scales = now.input_scales.clone();
+                        scales.resize(columns, 1.0);
+                        scales[input] *= 10.0_f64.powf(direction * step);
+                        scales
+                    };
                     let exponent = now.scale.log10();
+                    let scales = turned(input, direction);
+                    if !self.is_known(now.neurons, exponent, &scales) {
+                        // As if none of them paid, which is so of most.
+                        let next = order[place..].iter().flat_map(|&i| [(i, -1.0), (i, 1.0)]);
+                        let next = next.skip(usize::from(direction > 0.0));
+                        let next = next.take(threads::current_threads());
+                        let next = next.map(|(i, d)| (now.neurons, exponent, turned(i, d)));
+                        self.look_ahead(next);
+                    }
                     if self.move_if(now.neurons, exponent, &scales, |new, old| {
                         new.improves_on(old, 2.0 + penalty)
                     })? {
@@ -363,8 +399,11 @@ impl<'a, A: Scalar> Search<'a, A> {
             return Ok(false);
         }
         self.spent += 1;
-        let scale = 10.0_f64.powf(exponent);
-        let attempt = self.attempt(neurons, scale, scales)?;
+        let known = self.ahead.remove(&self.setting(neurons, exponent, scales));
+        let attempt = match known {
+            Some(attempt) => attempt?,
+            None => self.attempt(neurons, exponent, scales)?,
+        };
         let moves = self
             .current()
             .is_none_or(|current| better(&attempt, current));
@@ -375,6 +414,37 @@ impl<'a, A: Scalar> Search<'a, A> {
         Ok(moves)
     }
 
+    fn setting(&self, neurons: usize, exponent: f64, scales: &[f64]) -> Setting {
+        Setting {
+            neurons,
+            exponent: exponent.to_bits(),
+            scales: scales.iter().map(|scale| scale.to_bits()).collect(),
+            links: self.links,
+        }
+    }
+
+    fn is_known(&self, neurons: usize, exponent: f64, scales: &[f64]) -> bool {
+        let setting = self.setting(neurons, exponent, scales);
+        self.ahead.contains_key(&setting)
+    }
+
+    /// Tries settings on several threads that [`move_if`](Self::move_if) may be about to try: what it finds
+    /// is not changed, nor what counts as spent.
+    fn look_ahead(&mut self, settings: impl IntoIterator<Item = (usize, f64, Vec<f64>)>) {
+        if threads::current_threads() == 1 {
+            return;
+        }
+        self.ahead.clear();
+        let left = self.limit.saturating_sub(self.spent);
+        let settings: Vec<_> = settings.into_iter().take(left).collect();
+        let search = &*self;
+        let tried = threads::map(settings, |(neurons, exponent, scales)| {
+            let setting = search.setting(neurons, exponent, &scales);
+            (setting, search.attempt(neurons, exponent, &scales))
+        });
+        self.ahead = tried.into_iter().collect();
+    }
+
     /// What a score counts for at a scale, over what it is: small scales make networks that are
     /// nearly polynomials, with large output weights that cancel among the rows and nowhere else.
     fn price(&self, scale: f64) -> f64 {
@@ -382,7 +452,8 @@ impl<'a, A: Scalar> Search<'a, A> {
         (1.0 + PER_DECADE).powf((center - scale.log10()).max(0.0))
     }
 
-    fn attempt(&self, neurons: usize, scale: f64, scales: &[f64]) -> Result<Attempt> {
+    fn attempt(&self, neurons: usize, exponent: f64, scales: &[f64]) -> Result<Attempt> {
+        let scale = 10.0_f64.powf(exponent);
         let mut trial = Trial {
             neurons,
             scale,

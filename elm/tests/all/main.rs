@@ -20,6 +20,7 @@ mod prune;
 mod ramps;
 mod settings;
 mod solve;
+mod threads;
 mod tune;
 mod uncertainty;
 mod unlike_inputs;
