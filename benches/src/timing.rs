@@ -44,8 +44,8 @@ pub fn fastest_seconds(repetitions: usize, mut work: impl FnMut()) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Processor time that this process has used, in seconds; where the system does not say, and on several threads,
-/// the time on the clock.
+/// Processor time that this process has used, in seconds; where the system does not say, and on several
+/// threads, the time on the clock.
 #[must_use]
 pub fn processor_seconds() -> f64 {
     #[cfg(unix)]

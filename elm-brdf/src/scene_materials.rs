@@ -287,8 +287,8 @@ impl MaterialLoader<MaterialTable> for SceneMaterialLoader {
 
 /// Makes a material on a thread of its own, and as many below it as there are here.
 ///
-/// A worker of the renderer asks for it, and holds locks. Waiting for other threads the library's way it would
-/// take up another tile meanwhile, which may wait for these very locks.
+/// A worker of the renderer asks for it, and holds locks. Waiting for other threads the library's way it
+/// would take up another tile meanwhile, which may wait for these very locks.
 fn apart(make: impl FnOnce() -> Result<Made> + Send) -> Result<Made> {
     let threads = elm::current_threads();
     let work = || elm::on_threads(threads, make)?;

@@ -44,11 +44,11 @@ mod merge;
 mod parts;
 mod shift;
 mod spectrum;
+mod threaded;
 #[cfg(feature = "serde")]
 mod upper;
 
 use std::marker::PhantomData;
-use std::ops::Range;
 
 use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis, Ix2, Zip, s};
 #[cfg(feature = "serde")]
@@ -65,7 +65,6 @@ use crate::model::ElmParams;
 use crate::network::Elm;
 use crate::scalar::{Scalar, power_of_two};
 use crate::solve::Solver;
-use crate::threads;
 
 /// Rows in, a triangle kept; see the [module](self).
 ///
@@ -315,71 +314,6 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
                     *none = others;
                 }
             }
-        }
-    }
-
-    /// Adds checked rows; where they are many, in parts that several threads factorize, each by itself.
-    fn take_in_parts(
-        &mut self,
-        x: ArrayView2<'_, A>,
-        t: ArrayView2<'_, A>,
-        weights: Option<ArrayView1<'_, A>>,
-    ) -> Result<()> {
-        /// Blocks of a part: putting its triangle under another costs less than half a block.
-        const BLOCKS: usize = 4;
-        /// Numbers in the blocks and triangles of all parts.
-        const ROOM: usize = 1 << 25;
-        let square = self.columns().saturating_mul(self.columns());
-        let most = (ROOM / square.saturating_mul(BLOCK + 2).max(1)).min(16);
-        let parts = (x.nrows() / (BLOCKS * self.block())).min(most);
-        if parts < 2 {
-            return self.take_in(x, t, weights);
-        }
-        let empty = self.without_rows();
-        let part_of = |rows: Range<usize>| -> Result<Self> {
-            let mut part = empty.clone();
-            let weights = weights.map(|weights| weights.slice_move(s![rows.clone()]));
-            part.take_in(
-                x.slice(s![rows.clone(), ..]),
-                t.slice(s![rows, ..]),
-                weights,
-            )?;
-            part.flush()?;
-            Ok(part)
-        };
-        let parts = threads::map(threads::split(x.nrows(), parts), part_of);
-        let mut parts = parts.into_iter().collect::<Result<Vec<_>>>()?;
-        // By twos, which are merged at the same time.
-        while parts.len() > 1 {
-            let mut pairs = Vec::new();
-            let mut rest = parts.into_iter();
-            while let Some(first) = rest.next() {
-                pairs.push((first, rest.next()));
-            }
-            let merged = threads::map(pairs, |(mut first, second)| -> Result<Self> {
-                if let Some(second) = second {
-                    first.merge_alike(&second)?;
-                }
-                Ok(first)
-            });
-            parts = merged.into_iter().collect::<Result<_>>()?;
-        }
-        parts.iter().try_for_each(|part| self.merge_alike(part))
-    }
-
-    /// As it was before the first row.
-    fn without_rows(&self) -> Self {
-        Self {
-            rows: 0,
-            weighted_rows: 0,
-            far: vec![0; self.inputs],
-            triangle: Array2::zeros(self.triangle.dim()),
-            scales: Array1::ones(self.columns()),
-            shift: None,
-            pending: Vec::new(),
-            bounds: None,
-            map: self.map.clone(),
-            ..*self
         }
     }
 

@@ -39,9 +39,9 @@
 //! what cannot be fitted or predicted is an [`Error`] that names the place.
 //!
 //! # Reproducibility
-//! One seed draws one random layer, bit for bit, on every platform. Work is cut into parts by sizes alone, so that
-//! no digit depends on the number of threads; between processors with different vector units results agree to
-//! rounding error.
+//! One seed draws one random layer, bit for bit, on every platform. Work is cut into parts by sizes alone, so
+//! that no digit depends on the number of threads; between processors with different vector units results
+//! agree to rounding error.
 //!
 //! # Features
 //! - `faer` (default): linear algebra in pure Rust.

@@ -1,12 +1,10 @@
 //! faer behind ndarray. Every matrix crosses as a slice, so no `unsafe` is needed.
 
+mod decompositions;
 mod gram;
 
-use faer::diag::DiagMut;
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_scratch};
 use faer::linalg::householder::{
-    apply_block_householder_sequence_on_the_left_in_place_with_conj as apply_q,
     apply_block_householder_sequence_transpose_on_the_left_in_place_scratch as sequence_scratch,
     apply_block_householder_sequence_transpose_on_the_left_in_place_with_conj as apply_q_transpose,
     apply_block_householder_transpose_on_the_left_in_place_scratch as householder_scratch,
@@ -17,7 +15,6 @@ use faer::linalg::lu::partial_pivoting as lu;
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::qr::no_pivoting as qr;
-use faer::linalg::svd::{ComputeSvdVectors, svd, svd_scratch};
 use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::linalg::{cholesky::llt, triangular_solve};
 use faer::reborrow::{Reborrow, ReborrowMut};
@@ -30,6 +27,7 @@ use pulp::{Simd, WithSimd};
 use super::{Backend, CholeskySolve, Eigen, Failure, QrFactor, Svd};
 use crate::simd::{Lanes, Level, Real};
 use crate::threads;
+use decompositions::{decompose, eigen, singular_values};
 use gram::add_gram;
 
 const PAR: Par = Par::Seq;
@@ -104,84 +102,6 @@ fn parts(work: usize) -> usize {
     (work / (4 * threads::WORTHWHILE)).clamp(1, MOST)
 }
 
-fn eigen<A: RealField + Copy + Zero + PartialOrd>(
-    a: ArrayView2<'_, A>,
-) -> Result<Eigen<A>, Failure> {
-    let n = a.nrows();
-    let a = gapless(a);
-    let mut values = Array1::zeros(n);
-    let mut vectors = Array2::zeros((n, n).f());
-    let yes = ComputeEigenvectors::Yes;
-    let scratch = self_adjoint_evd_scratch::<A>(n, yes, PAR, Default::default());
-    self_adjoint_evd(
-        view(a.view()),
-        DiagMut::from_slice_mut(values.as_slice_memory_order_mut().unwrap_or(&mut [])),
-        Some(view_mut(&mut vectors)),
-        PAR,
-        MemStack::new(&mut MemBuffer::new(scratch)),
-        Default::default(),
-    )
-    .map_err(|_| Failure::NoConvergence)?;
-    // They rise.
-    values.invert_axis(Axis(0));
-    vectors.invert_axis(Axis(1));
-    let positive = |value: A| if value > A::zero() { value } else { A::zero() };
-    Ok(Eigen {
-        values: values.mapv_into(positive),
-        vt: vectors.reversed_axes().as_standard_layout().into_owned(),
-    })
-}
-
-fn decompose<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>) -> Result<Svd<A>, Failure> {
-    /// Multiplications above which threads pay for factorizing a triangle by itself.
-    const LARGE: usize = 1 << 26;
-    let (rows, columns) = a.dim();
-    if rows >= 2 * columns && rows.saturating_mul(columns * columns) >= LARGE {
-        return decompose_by_triangle(a);
-    }
-    let k = rows.min(columns);
-    let a = gapless(a);
-    let mut s = Array1::zeros(k);
-    let mut u = Array2::zeros((rows, k).f());
-    let mut v = Array2::zeros((columns, k).f());
-    let thin = ComputeSvdVectors::Thin;
-    let scratch = svd_scratch::<A>(rows, columns, thin, thin, PAR, Default::default());
-    svd(
-        view(a.view()),
-        DiagMut::from_slice_mut(s.as_slice_memory_order_mut().unwrap_or(&mut [])),
-        Some(view_mut(&mut u)),
-        Some(view_mut(&mut v)),
-        PAR,
-        MemStack::new(&mut MemBuffer::new(scratch)),
-        Default::default(),
-    )
-    .map_err(|_| Failure::NoConvergence)?;
-    Ok(Svd {
-        u,
-        s,
-        vt: v.reversed_axes(),
-    })
-}
-
-/// Of a matrix of many rows: of its triangle, whose left singular vectors are then rotated back.
-fn decompose_by_triangle<A: RealField + Copy + Zero>(
-    a: ArrayView2<'_, A>,
-) -> Result<Svd<A>, Failure> {
-    let (rows, columns) = a.dim();
-    let (basis, factor) = factorized(a);
-    let Svd { u: inner, s, vt } = decompose(upper(&basis).view())?;
-    let mut u = Array2::zeros((rows, columns).f());
-    u.slice_mut(s![..columns, ..]).assign(&inner);
-    in_slabs(view_mut(&mut u), 2 * rows * columns, |slab| {
-        let scratch = sequence_scratch::<A>(rows, factor.nrows(), slab.ncols());
-        let (basis, factor) = (view(basis.view()), view(factor.view()));
-        let mut memory = MemBuffer::new(scratch);
-        let stack = MemStack::new(&mut memory);
-        apply_q(basis, factor, Conj::No, slab, PAR, stack);
-    });
-    Ok(Svd { u, s, vt })
-}
-
 /// A copy of a matrix in which [`factorize`] has left its triangle and reflections, and their factors.
 fn factorized<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>) -> (Array2<A>, Array2<A>) {
     let (rows, columns) = a.dim();
@@ -219,25 +139,6 @@ fn in_slabs<A: Send>(mut rest: MatMut<'_, A>, work: usize, apply: impl Fn(MatMut
         apply(slab);
         clean(());
     });
-}
-
-fn singular_values<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>) -> Result<Array1<A>, Failure> {
-    let (rows, columns) = a.dim();
-    let a = gapless(a);
-    let mut s = Array1::zeros(rows.min(columns));
-    let none = ComputeSvdVectors::No;
-    let scratch = svd_scratch::<A>(rows, columns, none, none, PAR, Default::default());
-    svd(
-        view(a.view()),
-        DiagMut::from_slice_mut(s.as_slice_memory_order_mut().unwrap_or(&mut [])),
-        None,
-        None,
-        PAR,
-        MemStack::new(&mut MemBuffer::new(scratch)),
-        Default::default(),
-    )
-    .map_err(|_| Failure::NoConvergence)?;
-    Ok(s)
 }
 
 fn triangularize<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(

@@ -55,8 +55,10 @@ fn decompose<A: Lapack<Real = A>>(a: ArrayView2<'_, A>) -> Result<Svd<A>, Failur
     }
 }
 
-fn eigen<A: Lapack<Real = A>>(a: ArrayView2<'_, A>) -> Result<Eigen<A>, Failure> {
-    let (values, vectors) = by_rows(a).eigh(UPLO::Lower).map_err(no_convergence)?;
+fn eigen<A: Lapack<Real = A> + PartialOrd>(a: ArrayView2<'_, A>) -> Result<Eigen<A>, Failure> {
+    // Both halves, as which of them is read depends on the layout.
+    let whole = Array2::from_shape_fn(a.dim(), |(i, j)| a[[i.max(j), i.min(j)]]);
+    let (values, vectors) = whole.eigh(UPLO::Lower).map_err(no_convergence)?;
     let rising = values.len();
     Ok(Eigen {
         values: Array1::from_shape_fn(rising, |i| {

@@ -215,13 +215,15 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         if sample.nrows() < neurons || !sample.iter().all(|value| value.is_finite()) {
             return Ok(false);
         }
-        let hidden = sample.slice(s![.., ..neurons]);
-        let nothing = Array2::zeros((sample.nrows(), 0));
-        let QrFactor { r, .. } = f64::triangularize(hidden, nothing.view())?;
+        let products = f64::gram(sample.slice(s![.., ..neurons]));
+        let largest = products.diag().fold(0.0, |m: f64, v| m.max(*v));
+        // Without a factor the condition is far beyond what is asked for.
+        let Ok(factor) = f64::cholesky(products) else {
+            return Ok(false);
+        };
         // Pivots bound the smallest singular value from above, columns the largest from below.
-        let smallest = r.diag().fold(f64::INFINITY, |m: f64, v| m.min(v.abs()));
-        let largest = squares(r.view()).fold(0.0, |m: f64, v| m.max(*v)).sqrt();
-        Ok(gram::allowed::<f64>((smallest / largest).powi(2)))
+        let smallest = factor.diag().fold(f64::INFINITY, |m: f64, v| m.min(*v));
+        Ok(gram::allowed::<f64>(smallest * smallest / largest))
     }
 
     /// The problem in the coordinates of its singular vectors, or nothing where the numbers are out

@@ -1,0 +1,50 @@
+//! What the program ends with when it cannot do what it was asked.
+
+use std::fmt;
+
+use datafusion::error::DataFusionError;
+
+/// One line that says what is wrong and where.
+#[derive(Debug)]
+pub(crate) struct Failure(String);
+
+impl Failure {
+    pub(crate) fn new(message: impl Into<String>) -> Self {
+        Self(message.into())
+    }
+
+    /// With what was being read or done.
+    pub(crate) fn at(place: impl fmt::Display, reason: impl fmt::Display) -> Self {
+        Self(format!("{place}: {reason}"))
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl From<DataFusionError> for Failure {
+    fn from(error: DataFusionError) -> Self {
+        Self(error.strip_backtrace())
+    }
+}
+
+impl From<datafusion::arrow::error::ArrowError> for Failure {
+    fn from(error: datafusion::arrow::error::ArrowError) -> Self {
+        Self(error.to_string())
+    }
+}
+
+impl From<elm::Error> for Failure {
+    fn from(error: elm::Error) -> Self {
+        Self(error.to_string())
+    }
+}
+
+impl From<elm::persist::Error> for Failure {
+    fn from(error: elm::persist::Error) -> Self {
+        Self(error.to_string())
+    }
+}
