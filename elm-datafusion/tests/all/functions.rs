@@ -96,7 +96,7 @@ async fn many_rows_give_the_accumulators_model_whatever_the_partitions() {
 }
 
 #[tokio::test]
-async fn a_group_of_few_rows_is_the_librarys_fit_bit_for_bit_whatever_the_partitions() {
+async fn a_group_of_few_rows_is_fitted_as_by_the_library_bit_for_bit_whatever_the_partitions() {
     let mut models = Vec::new();
     for partitions in [1, 4] {
         let context = session(partitions, &["SET elm.neurons = 30"])

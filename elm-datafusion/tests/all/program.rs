@@ -141,6 +141,7 @@ fn errors_name_the_place_and_leave_no_file() {
     fs::write(folder.join("q-2.csv"), "b,y\n1,2\n2,3\n").unwrap();
     fs::write(folder.join("few.csv"), "a,y\n1,5\n2,5\n").unwrap();
     fs::write(folder.join("none.csv"), "a,y\n").unwrap();
+    fs::write(folder.join("mixed.csv"), "a,y\nabc,1\n2,3\n").unwrap();
     fs::write(folder.join("broken.parquet"), b"PAR1 and then nothing").unwrap();
     let mut text = String::from("a,y\n");
     for row in 0..3000 {
@@ -160,6 +161,11 @@ fn errors_name_the_place_and_leave_no_file() {
     for (file, rest, expected) in [
         ("q-*.csv", &[][..], "q-2.csv: no column 'a'"),
         ("text.csv", &[], "oops"),
+        (
+            "mixed.csv",
+            &[],
+            "column 'a' holds numbers and text such as 'abc'",
+        ),
         ("broken.parquet", &[], "broken.parquet"),
         ("few.csv", &[], "constant"),
         ("none.csv", &[], "no rows"),
@@ -179,6 +185,12 @@ fn errors_name_the_place_and_leave_no_file() {
         let error = fit(file, rest);
         assert!(error.contains(expected), "{expected}: {error}");
     }
+    let error = bad(folder, &["sql", "SELECT elm_fit(y, kind) FROM 'p-1.csv'"]);
+    let expected = "elm_fit: argument 2 is Utf8; expected a number";
+    assert!(
+        error.contains(expected) && error.trim().lines().count() == 1,
+        "{error}"
+    );
     let fit = ["fit", "p-1.csv", "--target", "y", "-o"];
     let error = bad(folder, &[&fit[..], &["nowhere/m.elm"]].concat());
     assert!(error.contains("no folder nowhere"), "{error}");

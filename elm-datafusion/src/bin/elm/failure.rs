@@ -27,7 +27,16 @@ impl fmt::Display for Failure {
 
 impl From<DataFusionError> for Failure {
     fn from(error: DataFusionError) -> Self {
-        Self(error.strip_backtrace())
+        // The planner wraps what a function says of its arguments, and adds lines on its types.
+        let text = error.strip_backtrace();
+        let own = ["elm_fit", "elm_predict", "elm_sample"];
+        let own = own
+            .iter()
+            .filter_map(|name| text.rfind(&format!("planning: {name}")));
+        let start = own.max().map_or(0, |at| at + "planning: ".len());
+        let line = text[start..].lines().next().unwrap_or_default();
+        let line = line.split(". No function matches").next().unwrap_or(line);
+        Self(line.to_owned())
     }
 }
 

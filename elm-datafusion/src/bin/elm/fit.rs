@@ -226,6 +226,15 @@ impl Fit {
             found.extend(values.iter().flatten().map(str::to_owned));
         }
         found.sort();
+        let is_number = |value: &&String| value.trim().parse::<f64>().is_ok();
+        if let (Some(_), Some(text)) = (
+            found.iter().find(is_number),
+            found.iter().find(|value| !is_number(value)),
+        ) {
+            return Err(Failure::new(format!(
+                "column '{name}' holds numbers and text such as '{text}'; expected numbers, or text alone"
+            )));
+        }
         if found.len() > self.categories {
             let (most, example) = (self.categories, &found[0]);
             return Err(Failure::new(format!(
