@@ -55,6 +55,7 @@ const TABLES: &[(&str, &str, &str)] = &[
     ("tables", "tables.md", "tables --data {tables} --splits 2"),
     ("growth", "benchmarks.md: growth", "growth"),
     ("accumulate", "benchmarks.md: rows in chunks", "accumulate"),
+    ("threads", "benchmarks.md: several threads", "threads 2"),
     (
         "rows",
         "benchmarks.md: many rows in memory",

@@ -5,7 +5,7 @@
 
 use std::time::Instant;
 
-use elm::{Accumulator, ElmParams, on_threads};
+use elm::{Accumulator, ElmParams, on_this_thread};
 use elm_benches::timing::median;
 use ndarray::{Array1, Array2, Ix1, s};
 use rand::SeedableRng;
@@ -34,15 +34,19 @@ fn compare(
     pairs: usize,
     work: impl Fn() -> Result<Numbers, elm::Error> + Sync,
 ) -> Result<(), Error> {
-    let timed = |threads: usize| -> Result<(f64, Numbers), elm::Error> {
+    // Threads that are there already, as those of a program's own pool are.
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()?;
+    let timed = |work: &dyn Fn() -> Result<Numbers, elm::Error>| {
         let start = Instant::now();
-        let found = on_threads(threads, &work)??;
-        Ok((start.elapsed().as_secs_f64(), found))
+        let found = work()?;
+        Ok::<_, elm::Error>((start.elapsed().as_secs_f64(), found))
     };
     let (mut alone, mut ratios) = (Vec::new(), Vec::new());
     for _ in 0..pairs {
-        let (one, expected) = timed(1)?;
-        let (several, found) = timed(threads)?;
+        let (one, expected) = timed(&|| on_this_thread(&work))?;
+        let (several, found) = timed(&|| pool.install(&work))?;
         let same = expected
             .iter()
             .zip(&found)
