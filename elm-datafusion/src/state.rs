@@ -29,7 +29,8 @@ enum Held {
 impl Persist for State {
     const KIND: &'static str = "elm fit state";
     const SCALAR: &'static str = "f64";
-    const VERSION: u32 = 1;
+    /// 100 times this layout's and the accumulator's, which is part of it.
+    const VERSION: u32 = 100 + <Accumulator<f64> as Persist>::VERSION;
 }
 
 impl State {

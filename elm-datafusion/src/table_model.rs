@@ -91,5 +91,6 @@ pub struct TableModel {
 impl Persist for TableModel {
     const KIND: &'static str = "elm table model";
     const SCALAR: &'static str = "f64";
-    const VERSION: u32 = 1;
+    /// 100 times this layout's and the network's, which is part of it.
+    const VERSION: u32 = 100 + <Elm<f64> as Persist>::VERSION;
 }

@@ -68,11 +68,19 @@ fn main() -> ExitCode {
 fn run(cli: Cli) -> Result<(), Failure> {
     let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
     let threads = cli.threads.map_or(cores, NonZeroUsize::get);
+    let refused = |reason: &dyn std::fmt::Display| {
+        Failure::new(format!("cannot start {threads} threads: {reason}"))
+    };
+    // Those that fits and predictions share work among.
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build_global()
+        .map_err(|reason| refused(&reason))?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(threads)
         .enable_all()
         .build()
-        .map_err(|reason| Failure::new(format!("cannot start {threads} threads: {reason}")))?;
+        .map_err(|reason| refused(&reason))?;
     let config = SessionConfig::new()
         .with_target_partitions(PARTITIONS)
         .with_information_schema(true);
