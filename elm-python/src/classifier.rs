@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use elm::classify::{ClassAccumulator, ClassPredictor, ClassWeights, LabeledRows};
-use elm::{ElmClassifier, Scalar, onnx, persist};
+use elm::{ElmClassifier, ElmParams, Scalar, onnx, persist};
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -211,23 +211,60 @@ impl Classifier {
 #[pyclass(module = "elm_learn._elm_learn")]
 pub(crate) struct ClassRows {
     rows: ClassAccumulator<f64, u32>,
-    threads: usize,
+}
+
+impl ClassRows {
+    fn start(
+        params: &ElmParams<f64>,
+        sample: &ArrayView2<'_, f64>,
+        classes: u32,
+    ) -> PyResult<Self> {
+        let all: Vec<u32> = (0..classes).collect();
+        let rows = ClassAccumulator::from_sample(params, sample, &all).map_err(error)?;
+        Ok(Self {
+            rows: rows.with_unlike_rows(true),
+        })
+    }
 }
 
 #[pymethods]
 impl ClassRows {
+    /// For rows like those of `sample`, without a search.
     #[new]
     fn new(settings: &Settings, sample: PyReadonlyArray2<'_, f64>, classes: u32) -> PyResult<Self> {
-        let params = settings.params()?;
-        let all: Vec<u32> = (0..classes).collect();
-        let rows = ClassAccumulator::from_sample(&params, &sample.as_array(), &all);
-        Ok(Self {
-            rows: rows.map_err(error)?.with_unlike_rows(true),
-            threads: settings.threads,
-        })
+        Self::start(&settings.params()?, &sample.as_array(), classes)
     }
 
-    #[pyo3(signature = (x, labels, weights=None, class_weights=None))]
+    /// For rows like those of `x` and `labels`, on which settings that are to be chosen are searched for.
+    #[staticmethod]
+    fn prepare(
+        py: Python<'_>,
+        settings: &Settings,
+        x: PyReadonlyArray2<'_, f64>,
+        labels: PyReadonlyArray1<'_, u32>,
+        classes: u32,
+        class_weights: Option<Vec<f64>>,
+    ) -> PyResult<Self> {
+        let (x, labels) = (x.as_array(), labels.as_array().to_vec());
+        let weights = Weights {
+            rows: None,
+            classes: class_weights,
+            balanced: false,
+        };
+        on_threads(py, settings.threads, || {
+            let params = match settings.recipe()? {
+                Recipe::Given(params) => params,
+                Recipe::Search(tuner) => {
+                    let rows = labeled(&x, &labels, classes, weights).map_err(error)?;
+                    let found = tuner.tune_classifier(&rows).map_err(error)?.params;
+                    settings.with_alpha(&found)?.unwrap_or(found)
+                }
+            };
+            Self::start(&params, &x, classes)
+        })?
+    }
+
+    #[pyo3(signature = (x, labels, weights, class_weights, threads))]
     fn push(
         &mut self,
         py: Python<'_>,
@@ -235,6 +272,7 @@ impl ClassRows {
         labels: PyReadonlyArray1<'_, u32>,
         weights: Option<PyReadonlyArray1<'_, f64>>,
         class_weights: Option<Vec<f64>>,
+        threads: usize,
     ) -> PyResult<()> {
         let labels = labels.as_array().to_vec();
         let classes = self.rows.classes().len() as u32;
@@ -245,26 +283,41 @@ impl ClassRows {
         };
         let (x, rows) = (x.as_array(), &mut self.rows);
         let push = || rows.push_labeled(&labeled(&x, &labels, classes, weights)?);
-        on_threads(py, self.threads, push)?.map_err(error)
+        on_threads(py, threads, push)?.map_err(error)
     }
 
-    fn fit(&self, py: Python<'_>) -> PyResult<Classifier> {
-        let model = on_threads(py, self.threads, || self.rows.fit())?.map_err(error)?;
+    fn merge(&mut self, py: Python<'_>, other: &Self, threads: usize) -> PyResult<()> {
+        on_threads(py, threads, || self.rows.merge(&other.rows))?.map_err(error)
+    }
+
+    fn compact(&mut self, py: Python<'_>, threads: usize) -> PyResult<()> {
+        on_threads(py, threads, || self.rows.compact())?.map_err(error)
+    }
+
+    fn forget(&mut self, factor: f64) -> PyResult<()> {
+        self.rows.forget(factor).map_err(error)
+    }
+
+    #[getter]
+    fn rows(&self) -> u64 {
+        self.rows.rows()
+    }
+
+    fn fit(&self, py: Python<'_>, threads: usize) -> PyResult<Classifier> {
+        let model = on_threads(py, threads, || self.rows.fit())?.map_err(error)?;
         Ok(Classifier {
             kind: Kind::F64(Packed::of(model)),
         })
     }
 
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        Ok(PyBytes::new(
-            py,
-            &persist::to_bytes(&self.rows).map_err(error)?,
-        ))
+        let bytes = persist::to_bytes(&self.rows).map_err(error)?;
+        Ok(PyBytes::new(py, &bytes))
     }
 
     #[staticmethod]
     fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
         let rows = persist::from_bytes(bytes).map_err(error)?;
-        Ok(Self { rows, threads: 1 })
+        Ok(Self { rows })
     }
 }

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use elm::persist;
 use elm::uncertainty::CompactUncertainElm;
-use elm::{Accumulator, Dataset, Elm, Predictor, Scalar, onnx};
+use elm::{Accumulator, Dataset, Elm, ElmParams, Predictor, Scalar, onnx};
 use ndarray::{Array2, ArrayView1, ArrayView2, Axis, Ix2, concatenate};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyTypeError;
@@ -235,32 +235,63 @@ pub(crate) fn precision(double: bool) -> onnx::Precision {
 #[pyclass(module = "elm_learn._elm_learn")]
 pub(crate) struct Rows {
     rows: Accumulator<f64>,
-    threads: usize,
+}
+
+impl Rows {
+    fn start(
+        params: &ElmParams<f64>,
+        sample: &ArrayView2<'_, f64>,
+        outputs: usize,
+    ) -> PyResult<Self> {
+        let rows = Accumulator::from_sample(params, sample, outputs).map_err(error)?;
+        Ok(Self {
+            rows: rows.with_unlike_rows(true),
+        })
+    }
 }
 
 #[pymethods]
 impl Rows {
+    /// For rows like those of `sample`, without a search.
     #[new]
     fn new(
         settings: &Settings,
         sample: PyReadonlyArray2<'_, f64>,
         outputs: usize,
     ) -> PyResult<Self> {
-        let params = settings.params()?;
-        let rows = Accumulator::from_sample(&params, &sample.as_array(), outputs).map_err(error)?;
-        Ok(Self {
-            rows: rows.with_unlike_rows(true),
-            threads: settings.threads,
-        })
+        Self::start(&settings.params()?, &sample.as_array(), outputs)
     }
 
-    #[pyo3(signature = (x, y, weights=None))]
+    /// For rows like those of `x` and `y`, on which settings that are to be chosen are searched for.
+    #[staticmethod]
+    fn prepare(
+        py: Python<'_>,
+        settings: &Settings,
+        x: PyReadonlyArray2<'_, f64>,
+        y: PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<Self> {
+        let (x, y) = (x.as_array(), y.as_array());
+        on_threads(py, settings.threads, || {
+            let params = match settings.recipe()? {
+                Recipe::Given(params) => params,
+                Recipe::Search(tuner) => {
+                    let data = Dataset::new(&x, &y).map_err(error)?;
+                    let found = tuner.tune(&data).map_err(error)?.params;
+                    settings.with_alpha(&found)?.unwrap_or(found)
+                }
+            };
+            Self::start(&params, &x, y.ncols())
+        })?
+    }
+
+    #[pyo3(signature = (x, y, weights, threads))]
     fn push(
         &mut self,
         py: Python<'_>,
         x: PyReadonlyArray2<'_, f64>,
         y: PyReadonlyArray2<'_, f64>,
         weights: Option<PyReadonlyArray1<'_, f64>>,
+        threads: usize,
     ) -> PyResult<()> {
         let (x, y, w) = (
             x.as_array(),
@@ -268,7 +299,7 @@ impl Rows {
             weights.as_ref().map(|w| w.as_array()),
         );
         let rows = &mut self.rows;
-        on_threads(py, self.threads, || {
+        on_threads(py, threads, || {
             let mut data = Dataset::new(&x, &y)?;
             if let Some(w) = &w {
                 data = data.with_weights(w)?;
@@ -278,23 +309,38 @@ impl Rows {
         .map_err(error)
     }
 
-    fn fit(&self, py: Python<'_>) -> PyResult<Network> {
-        let model = on_threads(py, self.threads, || self.rows.fit())?.map_err(error)?;
+    fn merge(&mut self, py: Python<'_>, other: &Self, threads: usize) -> PyResult<()> {
+        on_threads(py, threads, || self.rows.merge(&other.rows))?.map_err(error)
+    }
+
+    fn compact(&mut self, py: Python<'_>, threads: usize) -> PyResult<()> {
+        on_threads(py, threads, || self.rows.compact())?.map_err(error)
+    }
+
+    fn forget(&mut self, factor: f64) -> PyResult<()> {
+        self.rows.forget(factor).map_err(error)
+    }
+
+    #[getter]
+    fn rows(&self) -> u64 {
+        self.rows.rows()
+    }
+
+    fn fit(&self, py: Python<'_>, threads: usize) -> PyResult<Network> {
+        let model = on_threads(py, threads, || self.rows.fit())?.map_err(error)?;
         Ok(Network {
             kind: Kind::F64(Packed::of(model)),
         })
     }
 
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        Ok(PyBytes::new(
-            py,
-            &persist::to_bytes(&self.rows).map_err(error)?,
-        ))
+        let bytes = persist::to_bytes(&self.rows).map_err(error)?;
+        Ok(PyBytes::new(py, &bytes))
     }
 
     #[staticmethod]
     fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
         let rows = persist::from_bytes(bytes).map_err(error)?;
-        Ok(Self { rows, threads: 1 })
+        Ok(Self { rows })
     }
 }

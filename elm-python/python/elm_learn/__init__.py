@@ -9,8 +9,9 @@
 from importlib.metadata import version as _version
 
 from . import brdf
+from ._base import merge
 from ._classifier import ElmClassifier
 from ._regressor import ElmRegressor
 
 __version__ = _version("elm-learn")
-__all__ = ["ElmClassifier", "ElmRegressor", "brdf"]
+__all__ = ["ElmClassifier", "ElmRegressor", "brdf", "merge"]

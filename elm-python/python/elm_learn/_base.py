@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import threading
 from numbers import Integral, Real
@@ -18,6 +19,48 @@ PARTIAL_NEURONS = 200
 #: Multiply-adds from which a fit runs where Ctrl-C can end the wait for it.
 LONG = 2e9
 FLOATS = (np.float64, np.float32)
+
+
+def merge(models):
+    """One model of all rows that several have taken in by ``partial_fit``, each from a copy of one that was prepared.
+
+    The models do not change, so that a worker may repeat a merge. The order of rows and of merges changes the
+    result by rounding errors alone.
+
+    Parameters
+    ----------
+    models : iterable of ElmRegressor or of ElmClassifier
+        At least one.
+
+    Returns
+    -------
+    model : ElmRegressor or ElmClassifier
+
+    Examples
+    --------
+    >>> import copy
+    >>> import numpy as np
+    >>> from elm_learn import ElmRegressor, merge
+    >>> X = np.linspace(-3, 3, 200)[:, None]
+    >>> y = np.sin(X[:, 0])
+    >>> start = ElmRegressor(30, random_state=0).prepare(X[::5], y[::5])
+    >>> workers = [copy.deepcopy(start).partial_fit(X[i::4], y[i::4]) for i in range(4)]
+    >>> round(merge(workers).score(X, y), 3)
+    1.0
+    """
+    models = list(models)
+    if not models:
+        raise ValueError("merge needs at least one model")
+    whole = copy.deepcopy(models[0])
+    own = whole._pieces()
+    for model in models[1:]:
+        if type(model) is not type(whole):
+            raise TypeError(f"cannot merge {type(model).__name__} into {type(whole).__name__}")
+        if not np.array_equal(getattr(model, "classes_", None), getattr(whole, "classes_", None)):
+            raise ValueError("models of different classes cannot be merged")
+        own.merge(model._pieces(), whole._threads())
+    whole._network = None
+    return whole
 
 
 class ElmBase(BaseEstimator):
@@ -77,8 +120,52 @@ class ElmBase(BaseEstimator):
     def _fitted(self):
         """The fitted network; after ``partial_fit`` it is solved for when it is first needed."""
         if self._network is None:
-            self._network = self._rows.fit()
+            self._network = self._rows.fit(self._threads())
         return self._network
+
+    def _pieces(self):
+        """What rows in pieces have left."""
+        check_is_fitted(self)
+        if self._rows is None:
+            raise ValueError(
+                f"this {type(self).__name__} was fitted by fit, which keeps no rows to add to: "
+                "begin with prepare or partial_fit"
+            )
+        return self._rows
+
+    def compact(self):
+        """Make a pickle of a model in pieces small: at most half the square of neurons and outputs in numbers.
+
+        Returns
+        -------
+        self : estimator
+        """
+        self._pieces().compact(self._threads())
+        return self
+
+    def forget(self, factor):
+        """Let all rows so far count less, for what drifts.
+
+        Parameters
+        ----------
+        factor : float
+            What their weights are multiplied by, from 0 to 1.
+
+        Returns
+        -------
+        self : estimator
+        """
+        self._pieces().forget(float(factor))
+        self._network = None
+        return self
+
+    @property
+    def n_rows_(self) -> int:
+        """Rows that ``partial_fit`` has taken in, those of merged models included."""
+        check_is_fitted(self)
+        if self._rows is None:
+            raise AttributeError("n_rows_ is known after prepare or partial_fit")
+        return self._rows.rows
 
     @staticmethod
     def _weights(X, sample_weight):

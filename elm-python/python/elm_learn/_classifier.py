@@ -138,11 +138,60 @@ class ElmClassifier(ClassifierMixin, ElmBase):
         self._set_importances(network)
         return self
 
+    def prepare(self, X, y, classes=None):
+        """Draw the layer for rows like these and take none in: what workers and :func:`merge` begin with.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            A sample of the rows to come; it standardizes the inputs.
+        y : array-like of shape (n_samples,)
+            Its labels, for settings that are to be chosen (``n_neurons="auto"``, ``scale="loo"``).
+        classes : array-like of shape (n_classes,), default=None
+            All classes; those of the sample if not given.
+
+        Returns
+        -------
+        self : ElmClassifier
+        """
+        X, y = validate_data(self, X, y, dtype=np.float64)
+        check_classification_targets(y)
+        y = column_or_1d(y, warn=True)
+        settings = self._settings()
+        self._name_classes(np.unique(y) if classes is None else np.unique(classes))
+        X, codes = self._arranged(X, self._codes(y))
+        arguments = (settings, X, codes, len(self.classes_), self._class_weights())
+        self._begin(interruptible(self._work(X), ClassRows.prepare, *arguments))
+        return self
+
+    def _begin(self, rows):
+        self._rows = rows
+        self._network = None
+        self._importances = None
+
+    def _name_classes(self, classes):
+        if isinstance(self.class_weight, str):
+            raise ValueError(
+                f"class_weight={self.class_weight!r} needs all rows: give a dict for rows in pieces"
+            )
+        if len(classes) < 2:
+            raise ValueError("ElmClassifier needs at least 2 classes, got only one class")
+        self.classes_ = classes
+
+    def _codes(self, y):
+        codes = np.searchsorted(self.classes_, y)
+        codes = np.minimum(codes, len(self.classes_) - 1)
+        unknown = self.classes_[codes] != y
+        if unknown.any():
+            raise ValueError(f"the label {y[unknown][0]!r} is none of classes_")
+        return codes.astype(np.uint32)
+
     def partial_fit(self, X, y, classes=None, sample_weight=None):
         """Take in more rows; the memory that is needed does not grow with them.
 
         The first rows standardize the inputs, so they should be like those to come. ``n_neurons="auto"`` is
-        200 here, ``scale="loo"`` is 1, and ridge is chosen by generalized cross-validation.
+        200 here, ``scale="loo"`` is 1, unless :meth:`prepare` has chosen them; ridge is chosen by
+        generalized cross-validation.
 
         Parameters
         ----------
@@ -169,25 +218,14 @@ class ElmClassifier(ClassifierMixin, ElmBase):
                 classes = getattr(self, "classes_", None)
             if classes is None:
                 raise ValueError("classes must be passed on the first call to partial_fit")
-            if isinstance(self.class_weight, str):
-                raise ValueError(
-                    f"class_weight={self.class_weight!r} needs all rows: pass a dict to partial_fit"
-                )
-            self.classes_ = np.unique(classes)
-            if len(self.classes_) < 2:
-                raise ValueError("ElmClassifier needs at least 2 classes, got only one class")
+            self._name_classes(np.unique(classes))
         elif classes is not None and not np.array_equal(np.unique(classes), self.classes_):
             raise ValueError(f"classes={classes!r} are not those of the first call")
-        codes = np.searchsorted(self.classes_, y)
-        codes = np.minimum(codes, len(self.classes_) - 1)
-        unknown = self.classes_[codes] != y
-        if unknown.any():
-            raise ValueError(f"the label {y[unknown][0]!r} is none of classes_")
+        codes = self._codes(y)
         weights = self._weights(X, sample_weight)
         if first:
-            self._rows = ClassRows(self._settings(partial=True), X, len(self.classes_))
-            self._importances = None
-        self._rows.push(X, codes.astype(np.uint32), weights, self._class_weights())
+            self._begin(ClassRows(self._settings(partial=True), X, len(self.classes_)))
+        self._rows.push(X, codes, weights, self._class_weights(), self._threads())
         self._network = None
         return self
 

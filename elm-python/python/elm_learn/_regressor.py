@@ -136,12 +136,41 @@ class ElmRegressor(RegressorMixin, ElmBase):
                 self.loo_score_ = float(np.mean(1 - self.loo_rmse_[known] ** 2 / variance[known]))
         return self
 
+    def prepare(self, X, y):
+        """Draw the layer for rows like these and take none in: what workers and :func:`merge` begin with.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            A sample of the rows to come; it standardizes the inputs.
+        y : array-like of shape (n_samples,) or (n_samples, n_outputs)
+            Its targets, for settings that are to be chosen (``n_neurons="auto"``, ``scale="loo"``).
+
+        Returns
+        -------
+        self : ElmRegressor
+        """
+        X, y = validate_data(self, X, y, dtype=np.float64, multi_output=True, y_numeric=True)
+        settings = self._settings()
+        y = np.asarray(y, dtype=np.float64)
+        targets = y[:, None] if y.ndim == 1 else y
+        X, targets = self._arranged(X, targets)
+        rows = interruptible(self._work(X), Rows.prepare, settings, X, targets)
+        self._begin(rows, y.ndim == 1)
+        return self
+
+    def _begin(self, rows, single):
+        self._rows = rows
+        self._single = single
+        self._network = None
+        self._importances = None
+
     def partial_fit(self, X, y, sample_weight=None):
         """Take in more rows; the memory that is needed does not grow with them.
 
         The first rows standardize the inputs, so they should be like those to come. The answer is that of
         a fit to all rows, with ridge chosen by generalized cross-validation. ``n_neurons="auto"`` is 200
-        here, ``scale="loo"`` is 1.
+        here, ``scale="loo"`` is 1, unless :meth:`prepare` has chosen them.
 
         Parameters
         ----------
@@ -164,11 +193,8 @@ class ElmRegressor(RegressorMixin, ElmBase):
         y = np.asarray(y, dtype=np.float64)
         targets = y[:, None] if y.ndim == 1 else y
         if first:
-            settings = self._settings(partial=True)
-            self._single = y.ndim == 1
-            self._rows = Rows(settings, X, targets.shape[1])
-            self._importances = None
-        self._rows.push(X, targets, weights)
+            self._begin(Rows(self._settings(partial=True), X, targets.shape[1]), y.ndim == 1)
+        self._rows.push(X, targets, weights, self._threads())
         self._network = None
         return self
 

@@ -76,11 +76,15 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
 
     /// Lets all rows enter the triangle, of which a file then holds little more: half the square of neurons
     /// and outputs in numbers, where rows that wait to be factorized together are several times as many.
-    /// Costs a factorization. A state of few rows, fewer than neurons, is smaller without it.
+    /// Costs a factorization. Rows that are fewer numbers than the triangle stay as they are.
     ///
     /// # Errors
     /// [`Error::Overflow`] for values beyond the range; nothing has changed then.
     pub fn compact(&mut self) -> Result<()> {
+        let triangle = self.columns() * (self.columns() + 1) / 2;
+        if self.pending.len() < triangle && !self.has_triangle() {
+            return Ok(());
+        }
         let mut next = self.clone();
         next.flush()?;
         next.pending = Vec::new();

@@ -249,6 +249,29 @@ impl<A: Scalar, L: Ord + Clone> ClassAccumulator<A, L> {
         Ok(())
     }
 
+    /// Makes a file of it smaller; see [`Accumulator::compact`].
+    ///
+    /// # Errors
+    /// Those of [`Accumulator::compact`].
+    pub fn compact(&mut self) -> Result<()> {
+        self.rows.compact()
+    }
+
+    /// Lets all rows so far count less; see [`Accumulator::forget`].
+    ///
+    /// # Errors
+    /// Those of [`Accumulator::forget`].
+    pub fn forget(&mut self, factor: f64) -> Result<()> {
+        self.rows.forget(factor)?;
+        let less = A::from_f64(factor);
+        self.kept.iter_mut().for_each(|row| row.weight *= less);
+        self.kept.retain(|row| row.weight > A::zero());
+        if factor == 0.0 {
+            self.seen.fill(false);
+        }
+        Ok(())
+    }
+
     fn keep(&mut self, row: Kept<A>) {
         self.kept.push(row);
         if self.kept.len() >= 4 * KEPT {

@@ -180,10 +180,35 @@ fn pieces_in_any_order_give_what_a_batch_gives_and_may_lack_classes() {
     let unknown = rows.push(&x.select(Axis(0), &[0]), &["pink"]);
     assert_eq!(unknown, Err(Error::UnknownClass { row: 0 }));
     let mut other = ClassAccumulator::from_sample(&params, &x, &all).unwrap();
+    rows.compact().unwrap();
+    assert_eq!(rows.fit().unwrap(), pieces);
     other.merge(&rows).unwrap();
     assert!(
         (other.fit().unwrap().calibration().slope() - pieces.calibration().slope()).abs() < 1e-6
     );
+}
+
+#[test]
+fn classes_that_move_are_followed() {
+    let (x, labels) = clouds(300, 9);
+    let before: Vec<&str> = labels.iter().rev().copied().collect();
+    let params = ElmParams::new(20).with_solver(Ridge::relative(1e-6));
+    let new = ClassAccumulator::from_sample(&params, &x, &["blue", "green", "red"]).unwrap();
+    let mut only = new.clone();
+    only.push(&x, &labels).unwrap();
+    for factor in [0.0, 1e-300] {
+        let mut rows = new.clone();
+        rows.push(&x, &before).unwrap();
+        rows.forget(factor).unwrap();
+        if factor == 0.0 {
+            assert!(rows.fit().is_err());
+        }
+        rows.push(&x, &labels).unwrap();
+        let (rows, only) = (rows.fit().unwrap(), only.fit().unwrap());
+        let difference = rows.predict_proba(&x).unwrap() - only.predict_proba(&x).unwrap();
+        assert!(difference.iter().all(|d| d.abs() < 1e-6));
+    }
+    assert!(new.clone().forget(1.5).is_err());
 }
 
 #[test]
