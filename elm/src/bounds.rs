@@ -221,12 +221,13 @@ impl<A: Scalar> Bounds<A> {
         if !self.held {
             return;
         }
-        let (lower, upper) = self.held_inputs();
-        for mut row in x.rows_mut() {
-            Zip::from(&mut row)
-                .and(&lower)
-                .and(&upper)
-                .for_each(|x, &lower, &upper| *x = x.max(lower).min(upper));
+        hold(x, self.held_inputs());
+    }
+
+    /// Predictions, in place, each held to its range where they are held.
+    pub(crate) fn hold_predictions(&self, y: &mut Array2<A>) {
+        if self.held {
+            hold(y, self.predictions());
         }
     }
 
@@ -261,5 +262,15 @@ impl<A: Scalar> Bounds<A> {
             let squares = row.iter().map(|&v| (v / largest).powi(2));
             largest * squares.fold(A::zero(), |sum, v| sum + v).sqrt()
         })
+    }
+}
+
+/// Values, each held between the ends of its column.
+fn hold<A: Scalar>(values: &mut Array2<A>, (lower, upper): (Array1<A>, Array1<A>)) {
+    for mut row in values.rows_mut() {
+        Zip::from(&mut row)
+            .and(&lower)
+            .and(&upper)
+            .for_each(|value, &lower, &upper| *value = value.max(lower).min(upper));
     }
 }

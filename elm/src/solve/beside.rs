@@ -221,18 +221,14 @@ impl SharedColumns {
 }
 
 impl Beside {
-    /// The squared error of each row, the sum over outputs, given what layer and shared columns make of
-    /// the rows.
-    pub(crate) fn squared_errors(
+    /// Predictions, given what layer and shared columns make of the rows.
+    pub(crate) fn predict(
         &self,
         hidden: ArrayView2<'_, f64>,
         shared: ArrayView2<'_, f64>,
-        targets: ArrayView2<'_, f64>,
-    ) -> Array1<f64> {
+    ) -> Array2<f64> {
         let (own, rest) = self.beta.view().split_at(Axis(0), hidden.ncols());
-        let predicted = f64::product(hidden, own) + f64::product(shared, rest) + &self.intercept;
-        let errors = &targets - &predicted;
-        errors.map_axis(Axis(1), |row| row.dot(&row))
+        f64::product(hidden, own) + f64::product(shared, rest) + &self.intercept
     }
 }
 

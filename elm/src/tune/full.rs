@@ -69,8 +69,10 @@ pub(super) fn search<A: Scalar, D: TargetDim>(
     let neurons = (rows.len() / 3).clamp(NEURONS.0, NEURONS.1);
     let seed = tuner.seed();
     let mut search = FullSearch {
-        plain: Seen::new(x.clone(), targets.clone(), weights.clone(), None, seed),
-        embedded: Seen::new(x.clone(), targets, weights, Some(bins(&x)), seed),
+        plain: Seen::new(x.clone(), targets.clone(), weights.clone(), None, seed)
+            .with_bounded(tuner.base.bounded()),
+        embedded: Seen::new(x.clone(), targets, weights, Some(bins(&x)), seed)
+            .with_bounded(tuner.base.bounded()),
         neurons,
         left: MOST_LAYERS,
         rounds: if tuner.per_input { ROUNDS } else { 0 },

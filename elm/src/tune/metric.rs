@@ -15,6 +15,7 @@ use ndarray::{Array1, Array2, ArrayView2, Axis};
 
 use super::Trial;
 use crate::activation::Activation;
+use crate::bounds::Bounds;
 use crate::error::{Error, Result};
 use crate::feature_map::{Biases, Distribution, Embedding, FeatureMap, Ramps, Scaler};
 use crate::model::ElmParams;
@@ -41,6 +42,7 @@ pub(super) struct Seen {
     /// The inputs as layers see them.
     u: Array2<f64>,
     variances: Array1<f64>,
+    bounded: bool,
     seed: u64,
 }
 
@@ -86,11 +88,7 @@ impl Seen {
         let view = weights.as_ref().map(|weights| weights.view());
         let scaler = Scaler::measure(x.view(), view);
         let ramps = bins.map(|bins| Ramps::of(x.view(), view, bins));
-        let scaled = scaler.transform(x.view());
-        let u = match &ramps {
-            Some(ramps) => ramps.beside(scaled.view(), x.view()),
-            None => scaled,
-        };
+        let u = see(&scaler, ramps.as_ref(), x.view());
         let variances = u.columns().into_iter().map(|column| {
             let moments = crate::stats::Moments::of(column.insert_axis(Axis(1)), view);
             moments.deviations().next().map_or(0.0, |d| d * d)
@@ -103,8 +101,15 @@ impl Seen {
             scaler,
             ramps,
             u,
+            bounded: true,
             seed,
         }
+    }
+
+    /// Whether predictions are held to the ranges of the rows that a network was fitted to.
+    pub(super) fn with_bounded(mut self, bounded: bool) -> Self {
+        self.bounded = bounded;
+        self
     }
 
     pub(super) fn has_ramps(&self) -> bool {
@@ -137,6 +142,15 @@ impl Seen {
     }
 }
 
+/// What neurons see of inputs.
+fn see(scaler: &Scaler<f64>, ramps: Option<&Ramps<f64>>, x: ArrayView2<'_, f64>) -> Array2<f64> {
+    let scaled = scaler.transform(x);
+    match ramps {
+        Some(ramps) => ramps.beside(scaled.view(), x),
+        None => scaled,
+    }
+}
+
 /// The settings of a layer of this search.
 pub(super) fn layer(neurons: usize, seed: u64) -> ElmParams<f64> {
     ElmParams::new(neurons)
@@ -145,6 +159,46 @@ pub(super) fn layer(neurons: usize, seed: u64) -> ElmParams<f64> {
         .with_distribution(Distribution::Normal)
         .with_direct_links(true)
         .with_seed(seed)
+}
+
+/// Rows that a path does not see, and judges its networks by.
+struct Held {
+    u: Array2<f64>,
+    targets: Array2<f64>,
+    /// Of the rows that it does see.
+    bounds: Option<Bounds<f64>>,
+}
+
+impl Held {
+    fn new(path: &Path<'_>, held: &[usize]) -> Self {
+        let seen = path.seen;
+        let (x, t) = (&seen.x, &seen.targets);
+        let weights = seen.weights_of(&path.rows);
+        let weights = weights.as_ref().map(|weights| weights.view());
+        let own = |matrix: &Array2<f64>| matrix.select(Axis(0), &path.rows);
+        let bounds = Bounds::of(own(x).view(), own(t).view(), weights, seen.bounded);
+        let mut x = x.select(Axis(0), held);
+        if let Some(bounds) = &bounds {
+            bounds.hold_inputs(&mut x);
+        }
+        Self {
+            u: see(&seen.scaler, seen.ramps.as_ref(), x.view()),
+            targets: t.select(Axis(0), held),
+            bounds,
+        }
+    }
+
+    /// The squared error of each row, the sum over outputs, of predictions as the fitted network will make
+    /// them: a single row far from the others would decide for all, else.
+    fn squared_errors(&self, attempt: &Attempt) -> Array1<f64> {
+        let hidden = attempt.map.layer().forward(self.u.view());
+        let mut predicted = attempt.solved.predict(hidden.view(), self.u.view());
+        if let Some(bounds) = &self.bounds {
+            bounds.hold_predictions(&mut predicted);
+        }
+        let errors = &self.targets - &predicted;
+        errors.map_axis(Axis(1), |row| row.dot(&row))
+    }
 }
 
 impl<'a> Path<'a> {
@@ -180,8 +234,7 @@ impl<'a> Path<'a> {
         rounds: usize,
         held: &[usize],
     ) -> Result<Vec<(Round, Array1<f64>)>> {
-        let seen_u = self.seen.u.select(Axis(0), held);
-        let seen_t = self.seen.targets.select(Axis(0), held);
+        let held = Held::new(self, held);
         let mut found: Vec<(Round, Array1<f64>)> = Vec::new();
         let mut scales = vec![1.0; self.u.ncols()];
         let (mut spread, mut step) = (FIRST_SPREAD, FIRST_STEP);
@@ -189,11 +242,7 @@ impl<'a> Path<'a> {
             let Some(best) = self.best_scale(&scales, spread, step) else {
                 break;
             };
-            let hidden = best.map.layer().forward(seen_u.view());
-            let errors = best
-                .solved
-                .squared_errors(hidden.view(), seen_u.view(), seen_t.view());
-            found.push((best.round.clone(), errors));
+            found.push((best.round.clone(), held.squared_errors(&best)));
             (spread, step) = (best.round.spread, best.round.step);
             match self.slopes(&best) {
                 Some(slopes) if round < rounds => scales = slopes,
