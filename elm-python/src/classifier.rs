@@ -17,7 +17,7 @@ use crate::settings::{Recipe, Settings, error};
 struct Packed<A: Scalar> {
     model: ElmClassifier<A, u32>,
     predictor: OnceLock<ClassPredictor<A>>,
-    input_scales: Vec<f64>,
+    relevance: Vec<f64>,
 }
 
 impl<A: Scalar> Packed<A> {
@@ -25,7 +25,7 @@ impl<A: Scalar> Packed<A> {
         Self {
             model,
             predictor: OnceLock::new(),
-            input_scales: Vec::new(),
+            relevance: Vec::new(),
         }
     }
 
@@ -85,7 +85,7 @@ fn fit<A: Scalar>(
                 None => tuned.classifier,
             };
             let mut packed = Packed::of(classifier);
-            packed.input_scales = tuned.params.input_scales().to_vec();
+            packed.relevance = tuned.params.relevance(x.ncols());
             Ok(packed)
         }
     }
@@ -177,8 +177,8 @@ impl Classifier {
     }
 
     #[getter]
-    fn input_scales(&self) -> Vec<f64> {
-        either!(&self.kind, model => model.input_scales.clone())
+    fn relevance(&self) -> Vec<f64> {
+        either!(&self.kind, model => model.relevance.clone())
     }
 
     #[getter]

@@ -21,7 +21,7 @@ pub(crate) struct Packed<A: Scalar> {
     predictor: OnceLock<Predictor<A>>,
     /// What intervals need.
     uncertain: Option<CompactUncertainElm<A>>,
-    input_scales: Vec<f64>,
+    relevance: Vec<f64>,
 }
 
 impl<A: Scalar> Packed<A> {
@@ -30,7 +30,7 @@ impl<A: Scalar> Packed<A> {
             model,
             predictor: OnceLock::new(),
             uncertain: None,
-            input_scales: Vec::new(),
+            relevance: Vec::new(),
         }
     }
 
@@ -75,7 +75,7 @@ fn fit<A: Scalar>(
         }
     };
     let mut packed = Packed::of(model);
-    packed.input_scales = params.input_scales().to_vec();
+    packed.relevance = params.relevance(x.ncols());
     if intervals {
         packed.uncertain = Some(params.fit_uncertain(&data).map_err(error)?.compact());
     }
@@ -183,8 +183,8 @@ impl Network {
 
     /// The scales of inputs that a search found; empty where all are 1.
     #[getter]
-    fn input_scales(&self) -> Vec<f64> {
-        either!(&self.kind, model => model.input_scales.clone())
+    fn relevance(&self) -> Vec<f64> {
+        either!(&self.kind, model => model.relevance.clone())
     }
 
     #[getter]

@@ -35,6 +35,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     );
     println!("tuned, scale per input:  {:.3}", own.best.score * deviation);
     println!("(noise in the targets: 1; inputs 6 to 10 say nothing)");
-    println!("scales: {:.2?}", own.best.input_scales);
+    println!("scales: {:.2?}", own.params.relevance(10));
     Ok(())
 }

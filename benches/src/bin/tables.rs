@@ -28,7 +28,7 @@ struct Arguments {
     /// Only tables whose names contain this
     #[arg(long, default_value = "")]
     only: String,
-    /// Of ours only this, full or auto
+    /// Of ours only this, auto or quick
     #[arg(long)]
     ours: Option<String>,
     /// Where the page is written; printed unless given

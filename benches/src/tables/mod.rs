@@ -12,7 +12,7 @@ use data::Split;
 use peers::Figure;
 
 /// Ours, by the names in the tables.
-pub const OURS: [&str; 2] = ["full", "auto"];
+pub const OURS: [&str; 2] = ["auto", "quick"];
 
 /// Ours on a split of a table.
 #[derive(Debug, Clone)]
@@ -34,7 +34,11 @@ pub struct Own {
 #[must_use]
 pub fn tuner(name: &str, seed: u64) -> Tuner<f64> {
     let tuner = ElmParams::auto().with_seed(seed);
-    if name == "full" { tuner.full() } else { tuner }
+    if name == "quick" {
+        tuner.quick()
+    } else {
+        tuner
+    }
 }
 
 /// Fits and judges one of [`OURS`].

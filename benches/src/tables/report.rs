@@ -64,7 +64,7 @@ impl Figures {
         let mut page = format!(
             "# Real tables\n\n    {command} --splits {splits}\n\nTest RMSE over the standard deviation of the test \
              targets, mean of {splits} splits of three quarters of the rows, 5,000 at most, and the \
-             rest. `auto` is `ElmParams::auto()`, `full` its full level; the others are \
+             rest. `auto` is `ElmParams::auto()`, `quick` its quick level; the others are \
              scikit-learn's, settings chosen on a quarter of the training rows \
              (`benches/peers/tables.py`). In brackets the seconds of processor time, one \
              thread each.\n\n| table | rows x inputs |"
@@ -103,7 +103,7 @@ impl Figures {
             .filter(|name| *name != "meats")
             .collect();
         page.push_str(
-            "\nError of `full` over that of others, geometric mean over tables and splits; the \
+            "\nError of `auto` over that of others, geometric mean over tables and splits; the \
              table meats (spectra) changes a mean by itself, so it is given without it, too.\n\n\
              | over | all | without meats | worst table | tables won |\n|---|---|---|---|---|\n",
         );
@@ -128,7 +128,7 @@ impl Figures {
         };
         let _ = writeln!(
             page,
-            "\nTime of `full` over that of HistGB, geometric mean over tables: {:.2}; over MLP {:.2}, \
+            "\nTime of `auto` over that of HistGB, geometric mean over tables: {:.2}; over MLP {:.2}, \
              over KRR {:.2}.",
             seconds("HistGB"),
             seconds("MLP"),

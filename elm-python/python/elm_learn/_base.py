@@ -198,7 +198,7 @@ class ElmBase(BaseEstimator):
 
     @property
     def feature_importances_(self):
-        """Scales of the inputs that ``n_neurons="auto"`` chose by held-out error, 1 in sum.
+        """Scales of the inputs, ramps along them included, that ``n_neurons="auto"`` chose, 1 in sum.
 
         For a model of given settings take :func:`sklearn.inspection.permutation_importance`.
 
@@ -217,7 +217,7 @@ class ElmBase(BaseEstimator):
     def _set_importances(self, network) -> None:
         self._importances = None
         if self.n_neurons == "auto":
-            scales = np.asarray(network.input_scales, dtype=float)
+            scales = np.asarray(network.relevance, dtype=float)
             if scales.size == 0:
                 scales = np.ones(self.n_features_in_)
             self._importances = scales / scales.sum()

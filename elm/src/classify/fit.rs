@@ -13,7 +13,7 @@ use crate::network::Elm;
 use crate::prune::{Keep, Pruned, Size};
 use crate::scalar::Scalar;
 use crate::solve::Solver;
-use crate::tune::{Trial, Tuner};
+use crate::tune::{Level, Trial, Tuner};
 
 /// A pruned classifier; made by [`ElmParams::fit_pruned_classifier`].
 #[derive(Debug, Clone, PartialEq)]
@@ -141,7 +141,8 @@ impl<A: Scalar> Tuner<A> {
     }
 
     /// Searches for the settings that make the held-out squared error of the 0 and 1 of classes small (that
-    /// is the Brier score of uncalibrated scores), and makes a classifier with them.
+    /// is the Brier score of uncalibrated scores), and makes a classifier with them. The search is the
+    /// [quick](Level::Quick) one unless the level is set.
     ///
     /// # Errors
     /// Those of [`tune`](Self::tune) and [`ElmParams::fit_labeled`].
@@ -151,7 +152,8 @@ impl<A: Scalar> Tuner<A> {
     ) -> Result<TunedClassifier<A, L>> {
         rows.check_several()?;
         let targets = Targets::new(rows);
-        let tuned = self.tune(&targets.dataset(rows)?)?;
+        let search = self.clone().or_level(Level::Quick);
+        let tuned = search.tune(&targets.dataset(rows)?)?;
         Ok(TunedClassifier {
             classifier: tuned.params.fit_labeled(rows)?,
             params: tuned.params,

@@ -217,6 +217,35 @@ impl<A: Scalar> ElmParams<A> {
         &self.map.input_scales
     }
 
+    /// The scale of each of so many inputs; where its [ramps](Self::with_embedding) have scales of their own, the
+    /// root of the sum of squares of them all.
+    ///
+    /// ```
+    /// use elm::ElmParams;
+    ///
+    /// let params = ElmParams::<f64>::new(10);
+    /// assert_eq!(params.relevance(3), [1.0, 1.0, 1.0]);
+    /// assert_eq!(params.with_input_scales(vec![2.0, 0.5]).relevance(2), [2.0, 0.5]);
+    /// ```
+    #[must_use]
+    #[doc(alias = "feature_importances_")]
+    pub fn relevance(&self, inputs: usize) -> Vec<f64> {
+        let scales = self.input_scales();
+        match self.embedding() {
+            _ if scales.is_empty() => vec![1.0; inputs],
+            Embedding::Ramps(ramps) if scales.len() > inputs => {
+                let mut squares = vec![0.0; inputs];
+                for (source, scale) in ramps.sources().zip(scales) {
+                    if let Some(square) = squares.get_mut(source) {
+                        *square += scale * scale;
+                    }
+                }
+                squares.into_iter().map(f64::sqrt).collect()
+            }
+            _ => scales.to_vec(),
+        }
+    }
+
     /// Seeds the random layer. One seed gives one layer, on every platform. 0 unless set.
     #[must_use]
     #[doc(alias = "random_state")]

@@ -16,19 +16,19 @@ use crate::stats::Moments;
 use crate::stream::Stream;
 use crate::threads;
 
-/// Rows under which the learned metric fits noise.
-pub(super) const FEWEST_ROWS: usize = 60;
+/// Rows under which the quick search is as good, and takes less time.
+pub(super) const FEWEST_ROWS: usize = 300;
 /// Neurons of a layer of the search.
 const NEURONS: (usize, usize) = (50, 200);
 /// Ramps of an input at most, and of all inputs together.
 const BINS: usize = 16;
 const COLUMNS: usize = 600;
 /// Rows up to which every row is held out once, in turn; of more, a quarter is.
-const FEW_ROWS: usize = 1500;
+pub(super) const FEW_ROWS: usize = 1500;
 const FOLDS: usize = 3;
 /// Layers that are solved at most; a path has some 20.
 const MOST_LAYERS: usize = 500;
-/// What ramps, or another round, must win by: each fits more to the rows.
+/// What any other candidate must win by over ramps and one round of slopes, which do well on most tables.
 const MARGIN: f64 = 0.005;
 /// A held-out error, relative to the targets' deviation, that sums of squares cannot tell from 0.
 const ROUNDING: f64 = 1e-5;
@@ -40,11 +40,36 @@ pub(super) struct Choice<A: Scalar> {
     pub(super) trials: Vec<Trial>,
 }
 
-/// Held-out errors of a number of rounds, with ramps or without.
+/// A number of rounds, with ramps or without, and its squared errors at the rows held out.
 struct Candidate {
     ramps: bool,
     round: usize,
+    /// The mean of these, of an output.
     error: f64,
+    squares: Array1<f64>,
+}
+
+impl Candidate {
+    /// Of ramps and one round of slopes, or the first where there is no such, unless another is surely
+    /// better: by more than the standard error of the mean difference, row by row.
+    fn best(candidates: Vec<Self>) -> Option<Self> {
+        let usual = |candidate: &Self| candidate.ramps && candidate.round == 1;
+        let usual = candidates.iter().position(usual).unwrap_or(0);
+        let known = candidates.get(usual)?;
+        let surely_better = |candidate: &Self| {
+            let gains = &known.squares - &candidate.squares;
+            let error = gains.std(0.0) / (gains.len() as f64).sqrt();
+            gains.mean().is_some_and(|mean| mean > error)
+        };
+        let mut best = usual;
+        for (place, candidate) in candidates.iter().enumerate() {
+            let wins = candidate.error < candidates[best].error * (1.0 - MARGIN);
+            if wins && surely_better(candidate) {
+                best = place;
+            }
+        }
+        candidates.into_iter().nth(best)
+    }
 }
 
 /// Nothing where errors are so small that the exact search is to decide.
@@ -180,44 +205,39 @@ impl FullSearch {
         };
         let ahead = self.look_ahead(&folds);
         let mut ahead = ahead.into_iter();
-        let mut best: Option<Candidate> = None;
+        let judged = folds.iter().map(Vec::len).sum::<usize>();
+        let outputs = self.plain.targets.ncols() as f64;
+        let mut candidates = Vec::new();
         for ramps in [false, true] {
             if ramps && !self.embedded.has_ramps() {
                 continue;
             }
-            let mut errors: Vec<(f64, usize)> = Vec::new();
+            let mut squares: Vec<Vec<f64>> = Vec::new();
             for held in &folds {
                 let found = match ahead.next() {
                     Some(path) => self.take(path, ramps, held)?,
                     None => self.path(ramps, others(rows, held), self.rounds, held)?,
                 };
                 let Some(found) = found else { break };
-                for (round, (_, squares)) in found.iter().enumerate() {
-                    let mean = self.mean(held, squares);
-                    if errors.len() <= round {
-                        errors.push((0.0, 0));
-                    }
-                    errors[round].0 += mean;
-                    errors[round].1 += 1;
+                squares.resize(squares.len().max(found.len()), Vec::new());
+                for ((_, own), squares) in found.iter().zip(&mut squares) {
+                    squares.extend(self.weighted(held, own));
                 }
                 let rounds = found.into_iter().map(|(round, _)| round);
                 self.last[usize::from(ramps)] = Some(rounds.collect());
             }
-            let outputs = self.plain.targets.ncols() as f64;
-            let complete = errors.iter().take_while(|(_, count)| *count == folds.len());
-            for (round, (sum, count)) in complete.enumerate() {
-                let error = sum / *count as f64 / outputs;
-                let wins = |best: &Candidate| error < best.error * (1.0 - MARGIN);
-                if best.as_ref().is_none_or(wins) {
-                    best = Some(Candidate {
-                        ramps,
-                        round,
-                        error,
-                    });
+            let complete = squares.into_iter().take_while(|own| own.len() == judged);
+            candidates.extend(complete.enumerate().map(|(round, squares)| {
+                let squares = Array1::from_vec(squares);
+                Candidate {
+                    ramps,
+                    round,
+                    error: squares.sum() / (judged as f64 * outputs),
+                    squares,
                 }
-            }
+            }));
         }
-        best.ok_or(crate::Error::NoConvergence {
+        Candidate::best(candidates).ok_or(crate::Error::NoConvergence {
             what: "the search for a weight scale",
         })
     }
@@ -284,12 +304,14 @@ impl FullSearch {
         Ok(Some(self.record(walked)))
     }
 
-    fn mean(&self, held: &[usize], squares: &Array1<f64>) -> f64 {
+    /// Squares whose mean is the weighted one.
+    fn weighted(&self, held: &[usize], squares: &Array1<f64>) -> Array1<f64> {
         match &self.plain.weights {
-            None => squares.sum() / held.len() as f64,
+            None => squares.clone(),
             Some(weights) => {
                 let weights = weights.select(Axis(0), held);
-                squares.dot(&weights) / weights.sum()
+                let mean = weights.sum() / weights.len() as f64;
+                squares * &weights / mean
             }
         }
     }

@@ -11,7 +11,7 @@
 //! cross-validation score. That score does not leave a row out of the slopes, so that the number of rounds,
 //! and whether there are ramps, are chosen by errors of rows that the slopes have not seen.
 
-use ndarray::{Array1, Array2, ArrayView2, Axis};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
 
 use super::Trial;
 use crate::activation::Activation;
@@ -20,13 +20,14 @@ use crate::error::{Error, Result};
 use crate::feature_map::{Biases, Distribution, Embedding, FeatureMap, Ramps, Scaler};
 use crate::model::ElmParams;
 use crate::solve::beside::{Beside, FIRST_STEP, SharedColumns};
+use crate::stats::Moments;
 
 /// Rounds at most.
 pub(super) const ROUNDS: usize = 3;
 /// The smallest scale of a column relative to the largest when slopes decide.
 const LEAST_RELEVANCE: f64 = 0.01;
 /// Rows at which slopes are taken.
-const SLOPE_ROWS: usize = 1000;
+pub(super) const SLOPE_ROWS: usize = 1000;
 /// Root mean square weighted sums that the first round tries; a factor of 2 apart.
 const FIRST_SPREAD: f64 = 0.4;
 const SPREADS: (f64, f64) = (0.05, 6.5);
@@ -89,12 +90,8 @@ impl Seen {
         let scaler = Scaler::measure(x.view(), view);
         let ramps = bins.map(|bins| Ramps::of(x.view(), view, bins));
         let u = see(&scaler, ramps.as_ref(), x.view());
-        let variances = u.columns().into_iter().map(|column| {
-            let moments = crate::stats::Moments::of(column.insert_axis(Axis(1)), view);
-            moments.deviations().next().map_or(0.0, |d| d * d)
-        });
         Self {
-            variances: variances.collect(),
+            variances: variances(u.view(), view),
             x,
             targets,
             weights,
@@ -124,15 +121,12 @@ impl Seen {
     }
 
     /// The scale of weights at which weighted sums have this root mean square.
-    fn scale(&self, spread: f64, column_scales: &[f64]) -> f64 {
-        let squares = column_scales.iter().zip(&self.variances);
-        let sum: f64 = squares
-            .map(|(scale, variance)| scale * scale * variance)
-            .sum();
-        if sum > 0.0 {
-            spread / sum.sqrt()
+    fn scale(&self, wanted: f64, column_scales: &[f64]) -> f64 {
+        let of_one = spread(column_scales, &self.variances);
+        if of_one > 0.0 {
+            wanted / of_one
         } else {
-            spread
+            wanted
         }
     }
 
@@ -338,15 +332,42 @@ impl<'a> Path<'a> {
                 Some(weights) => slopes.t().dot(weights),
             };
         }
-        let largest = squares.iter().copied().fold(0.0, f64::max).sqrt();
-        if !(largest > 0.0 && largest.is_finite()) {
-            return None;
-        }
-        let relevance = |square: &f64| (square.sqrt() / largest).max(LEAST_RELEVANCE);
-        let scales: Vec<f64> = squares.iter().map(relevance).collect();
-        let mean = scales.iter().map(|s| s * s).sum::<f64>() / scales.len() as f64;
-        Some(scales.iter().map(|scale| scale / mean.sqrt()).collect())
+        by_slopes(&squares)
     }
+}
+
+/// Scales of columns in proportion to the slopes along them, of which these are the sums of squares; nothing
+/// where there are no slopes.
+pub(super) fn by_slopes(squares: &Array1<f64>) -> Option<Vec<f64>> {
+    let largest = squares.iter().copied().fold(0.0, f64::max).sqrt();
+    if !(largest > 0.0 && largest.is_finite()) {
+        return None;
+    }
+    let relevance = |square: &f64| (square.sqrt() / largest).max(LEAST_RELEVANCE);
+    let scales: Vec<f64> = squares.iter().map(relevance).collect();
+    let mean = scales.iter().map(|s| s * s).sum::<f64>() / scales.len() as f64;
+    Some(scales.iter().map(|scale| scale / mean.sqrt()).collect())
+}
+
+/// The root mean square weighted sum of what neurons see, for weights of deviation 1 times the columns' scales.
+pub(super) fn spread(column_scales: &[f64], variances: &Array1<f64>) -> f64 {
+    let squares = column_scales.iter().zip(variances);
+    let sum: f64 = squares
+        .map(|(scale, variance)| scale * scale * variance)
+        .sum();
+    sum.sqrt()
+}
+
+/// The variance of each column.
+pub(super) fn variances(
+    matrix: ArrayView2<'_, f64>,
+    weights: Option<ArrayView1<'_, f64>>,
+) -> Array1<f64> {
+    let of = |column: ArrayView1<'_, f64>| {
+        let moments = Moments::of(column.insert_axis(Axis(1)), weights);
+        moments.deviations().next().map_or(0.0, |d| d * d)
+    };
+    matrix.columns().into_iter().map(of).collect()
 }
 
 /// Widened rows of a matrix.

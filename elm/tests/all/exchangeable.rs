@@ -51,7 +51,7 @@ fn the_search_counts_rows_by_their_weights() {
     let data = Dataset::new(&x, &t).unwrap();
     let blind = ElmParams::auto().tune(&data).unwrap().model;
     let weighted = data.with_weights(&weights).unwrap();
-    for tuner in [ElmParams::auto().full(), ElmParams::auto()] {
+    for tuner in [ElmParams::auto(), ElmParams::auto().quick()] {
         let tuned = tuner.tune(&weighted).unwrap();
         let (with, without) = (
             error(&tuned.model, &other, &exact),
@@ -211,7 +211,7 @@ fn a_factor_of_all_weights_and_rows_of_none_change_no_search_and_no_interval() {
     let close = |a: &Array1<f64>, b: &Array1<f64>| {
         approx::assert_relative_eq!(a, b, max_relative = 1e-4, epsilon = 1e-4);
     };
-    for tuner in [ElmParams::auto().full(), ElmParams::auto()] {
+    for tuner in [ElmParams::auto(), ElmParams::auto().quick()] {
         let (one, same) = (tuner.tune(&all).unwrap(), tuner.tune(&omitted).unwrap());
         close(
             &one.model.predict(&other).unwrap(),
@@ -331,8 +331,8 @@ fn whole_weights_are_numbers_of_rows_in_searches_and_classifiers() {
     let rows = LabeledRows::new(&x, &labels).unwrap();
     let rows = rows.with_weights(&weights).unwrap();
     for (what, tuner) in [
-        ("quick", ElmParams::auto()),
-        ("full", ElmParams::auto().full()),
+        ("quick", ElmParams::auto().quick()),
+        ("full", ElmParams::auto()),
     ] {
         let weighted = tuner.tune(&data).unwrap().model;
         let repeated = tuner.fit(&twice_x, &twice_t).unwrap();

@@ -67,7 +67,7 @@ fn a_scale_per_input_silences_inputs_that_say_nothing() {
 }
 
 #[test]
-fn neurons_are_doubled_only_while_that_pays() {
+fn a_simple_problem_gets_few_neurons() {
     let (x, _) = wave(400, 5);
     // A straight line needs few; noise is no reason for more.
     let noise: Array1<f64> =
@@ -77,6 +77,7 @@ fn neurons_are_doubled_only_while_that_pays() {
         .tune(&Dataset::new(&x, &straight).unwrap())
         .unwrap();
     assert!(line.best.neurons <= 200, "{}", line.best.neurons);
+    assert_eq!(line.model.hidden().neurons(), line.best.neurons);
     // Many waves need many.
     let waves = x.column(0).mapv(|x| (150.0 * x).sin());
     let x = x.select(Axis(1), &[0]);
