@@ -97,7 +97,10 @@ fn with_slopes<A: Scalar, D: TargetDim>(
 }
 
 /// The sum over outputs of squared errors of rows left out, relative to the targets' variances.
-fn left_out<A: Scalar, D: TargetDim>(model: &Elm<A, D>, data: &Dataset<'_, A, D>) -> f64 {
+pub(super) fn left_out<A: Scalar, D: TargetDim>(
+    model: &Elm<A, D>,
+    data: &Dataset<'_, A, D>,
+) -> f64 {
     let errors = model.diagnosis().leave_one_out.iter().flatten();
     let relative = errors.zip(deviations(data));
     relative

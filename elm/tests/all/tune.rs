@@ -92,6 +92,21 @@ fn a_simple_problem_gets_few_neurons() {
 }
 
 #[test]
+fn a_smooth_function_without_noise_is_left_to_the_exact_search() {
+    let x = Array2::from_shape_fn((300, 2), |(row, column)| {
+        (row as f64 * [0.618_034, 0.414_214][column]).fract()
+    });
+    let t: Array1<f64> = x.outer_iter().map(|x| (6.0 * x[0]).sin() * x[1]).collect();
+    let data = Dataset::new(&x, &t).unwrap();
+    let tuned = ElmParams::auto().tune(&data).unwrap();
+    let quick = ElmParams::auto().quick().tune(&data).unwrap();
+    assert_eq!(tuned.model, quick.model);
+    assert!(tuned.trials.len() > quick.trials.len());
+    let left_out = tuned.model.diagnosis().leave_one_out.as_ref().unwrap()[0];
+    assert!(left_out < 1e-6, "{left_out}");
+}
+
+#[test]
 fn a_seed_repeats_the_search_and_the_budget_bounds_it() {
     let (x, t) = wave(120, 1);
     for budget in [1, 5, 12] {
