@@ -74,7 +74,8 @@ fn what_is_built_on_fits_is_the_same_bits() {
             .unwrap()
     });
     same("the full search", || {
-        ElmParams::auto().full().tune(&data).unwrap().model
+        let tuner = ElmParams::auto().with_max_neurons(200);
+        tuner.tune(&data).unwrap().model
     });
     same("uncertainty", || {
         let model = params.fit_uncertain(&data).unwrap();
