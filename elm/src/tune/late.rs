@@ -96,13 +96,16 @@ fn with_slopes<A: Scalar, D: TargetDim>(
     })
 }
 
-/// The sum over outputs of squared errors of rows left out, relative to the targets' variances.
+/// The sum over outputs of squared errors of rows left out, relative to the targets' variances; not a number,
+/// which is neither more nor less than any, where they are not known.
 pub(super) fn left_out<A: Scalar, D: TargetDim>(
     model: &Elm<A, D>,
     data: &Dataset<'_, A, D>,
 ) -> f64 {
-    let errors = model.diagnosis().leave_one_out.iter().flatten();
-    let relative = errors.zip(deviations(data));
+    let Some(errors) = &model.diagnosis().leave_one_out else {
+        return f64::NAN;
+    };
+    let relative = errors.iter().zip(deviations(data));
     relative
         .map(|(error, deviation)| (error / deviation).powi(2))
         .sum()

@@ -262,3 +262,16 @@ fn on_the_toy_problems_auto_and_the_tuner_are_within_a_tenth_of_the_best_of_a_de
         }
     }
 }
+
+#[test]
+fn weights_leave_as_many_neurons_as_are_needed() {
+    let (x, _) = wave(400, 5);
+    let x = x.select(Axis(1), &[0]);
+    let waves = x.column(0).mapv(|x| (150.0 * x).sin());
+    // No whole multiples of each other, so that no errors of rows left out are reported.
+    let weights = Array1::from_shape_fn(400, |row| 1.0 + 0.001 * (row as f64).sqrt());
+    let data = Dataset::new(&x, &waves).unwrap();
+    let data = data.with_weights(&weights).unwrap();
+    let tuned = ElmParams::auto().tune(&data).unwrap();
+    assert!(tuned.best.neurons > 200, "{}", tuned.best.neurons);
+}
