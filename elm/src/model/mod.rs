@@ -217,8 +217,8 @@ impl<A: Scalar> ElmParams<A> {
         &self.map.input_scales
     }
 
-    /// The scale of each of so many inputs; where its [ramps](Self::with_embedding) have scales of their own, the
-    /// root of the sum of squares of them all.
+    /// The scale of each of so many inputs; where its [ramps](Self::with_embedding) have scales of their own,
+    /// the root of the sum of squares of them all.
     ///
     /// ```
     /// use elm::ElmParams;

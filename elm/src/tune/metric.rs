@@ -349,7 +349,7 @@ pub(super) fn by_slopes(squares: &Array1<f64>) -> Option<Vec<f64>> {
     Some(scales.iter().map(|scale| scale / mean.sqrt()).collect())
 }
 
-/// The root mean square weighted sum of what neurons see, for weights of deviation 1 times the columns' scales.
+/// The root mean square weighted sum of what neurons see, for weights of deviation 1 times those scales.
 pub(super) fn spread(column_scales: &[f64], variances: &Array1<f64>) -> f64 {
     let squares = column_scales.iter().zip(variances);
     let sum: f64 = squares

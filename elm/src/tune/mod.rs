@@ -26,17 +26,18 @@
 //! that are nearly polynomials have large output weights, which cancel among the rows and nowhere else.
 //!
 //! At the [full level](Level::Full), which is that of `auto` but for classes, neurons also see
-//! [ramps](crate::Ramps) along the inputs, with a scale for each input and ramp by the slopes of the network
-//! before, in rounds. Within a round scale and strength are chosen by generalized cross-validation; the number
-//! of rounds, and whether there are ramps, by errors of rows that neither weights nor slopes have seen, held
-//! to the [bounds](crate::bounds) of the others: one round and ramps, unless another choice is surely better.
-//! Of many rows the fit is made once more with slopes of its own, and kept where that is better; then neurons
-//! are halved while that costs less than a hundredth of the squared error of rows left out. Where the held-out
-//! error is below a tenth of the targets' deviation the quick search is made as well, and the fit of the smaller
-//! error of rows left out is kept.
+//! [ramps](crate::Ramps) along the inputs, with a scale for each input and ramp by the slopes of the
+//! network before, in rounds. Within a round scale and strength are chosen by generalized
+//! cross-validation; the number of rounds, and whether there are ramps, by errors of rows that neither
+//! weights nor slopes have seen, held to the [bounds](crate::bounds) of the others: one round and
+//! ramps, unless another choice is surely better. Of many rows the fit is made once more with slopes of
+//! its own, and kept where that is better; then neurons are halved while that costs less than a
+//! hundredth of the squared error of rows left out. Where the held-out error is below a tenth of the
+//! targets' deviation the quick search is made as well, and the fit of the smaller error of rows left
+//! out is kept.
 //!
-//! A trial looks at 2000 rows at most. At the quick level nearly all trials of `auto` are of a hundred neurons,
-//! some ten milliseconds each; at most nine are of more.
+//! A trial looks at 2000 rows at most. At the quick level nearly all trials of `auto` are of a hundred
+//! neurons, some ten milliseconds each; at most nine are of more.
 //!
 //! The regularization is chosen by leave-one-out within each trial. Every trial, and with it the
 //! way to the choice, is in [`Tuned::trials`]. Because the error of the winner was used to choose
@@ -110,8 +111,8 @@ pub enum Level {
     Full,
 }
 
-/// The held-out error, relative to the targets' deviation, below which targets are a smooth function with little
-/// noise, of which the exact search may make far more: it is made as well, and the better fit is kept.
+/// The held-out error, relative to the targets' deviation, below which targets are a smooth function with
+/// little noise, of which the exact search may make far more: it is made as well, and the better fit is kept.
 const SMOOTH: f64 = 0.1;
 
 /// One setting that was tried.
