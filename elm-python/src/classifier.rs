@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use elm::classify::{ClassAccumulator, ClassPredictor, ClassWeights, LabeledRows};
-use elm::{ElmClassifier, ElmParams, Scalar, onnx, persist};
+use elm::{ElmClassifier, Scalar, onnx, persist};
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -176,6 +176,7 @@ impl Classifier {
         either!(&self.kind, model => model.model.model().hidden().neurons())
     }
 
+    /// The scale of each input, where a search has been made.
     #[getter]
     fn relevance(&self) -> Vec<f64> {
         either!(&self.kind, model => model.relevance.clone())
@@ -213,29 +214,10 @@ pub(crate) struct ClassRows {
     rows: ClassAccumulator<f64, u32>,
 }
 
-impl ClassRows {
-    fn start(
-        params: &ElmParams<f64>,
-        sample: &ArrayView2<'_, f64>,
-        classes: u32,
-    ) -> PyResult<Self> {
-        let all: Vec<u32> = (0..classes).collect();
-        let rows = ClassAccumulator::from_sample(params, sample, &all).map_err(error)?;
-        Ok(Self {
-            rows: rows.with_unlike_rows(true),
-        })
-    }
-}
-
 #[pymethods]
 impl ClassRows {
-    /// For rows like those of `sample`, without a search.
-    #[new]
-    fn new(settings: &Settings, sample: PyReadonlyArray2<'_, f64>, classes: u32) -> PyResult<Self> {
-        Self::start(&settings.params()?, &sample.as_array(), classes)
-    }
-
-    /// For rows like those of `x` and `labels`, on which settings that are to be chosen are searched for.
+    /// For rows like those of `x` and `labels`, on which settings that are to be chosen are searched for;
+    /// without any.
     #[staticmethod]
     fn prepare(
         py: Python<'_>,
@@ -260,7 +242,11 @@ impl ClassRows {
                     settings.with_alpha(&found)?.unwrap_or(found)
                 }
             };
-            Self::start(&params, &x, classes)
+            let all: Vec<u32> = (0..classes).collect();
+            let rows = ClassAccumulator::from_sample(&params, &x, &all).map_err(error)?;
+            Ok(Self {
+                rows: rows.with_unlike_rows(true),
+            })
         })?
     }
 

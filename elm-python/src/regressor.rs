@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use elm::persist;
 use elm::uncertainty::CompactUncertainElm;
-use elm::{Accumulator, Dataset, Elm, ElmParams, Predictor, Scalar, onnx};
+use elm::{Accumulator, Dataset, Elm, Predictor, Scalar, onnx};
 use ndarray::{Array2, ArrayView1, ArrayView2, Axis, Ix2, concatenate};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyTypeError;
@@ -181,7 +181,7 @@ impl Network {
         either!(&self.kind, model => model.model.hidden().neurons())
     }
 
-    /// The scales of inputs that a search found; empty where all are 1.
+    /// The scale of each input.
     #[getter]
     fn relevance(&self) -> Vec<f64> {
         either!(&self.kind, model => model.relevance.clone())
@@ -237,32 +237,9 @@ pub(crate) struct Rows {
     rows: Accumulator<f64>,
 }
 
-impl Rows {
-    fn start(
-        params: &ElmParams<f64>,
-        sample: &ArrayView2<'_, f64>,
-        outputs: usize,
-    ) -> PyResult<Self> {
-        let rows = Accumulator::from_sample(params, sample, outputs).map_err(error)?;
-        Ok(Self {
-            rows: rows.with_unlike_rows(true),
-        })
-    }
-}
-
 #[pymethods]
 impl Rows {
-    /// For rows like those of `sample`, without a search.
-    #[new]
-    fn new(
-        settings: &Settings,
-        sample: PyReadonlyArray2<'_, f64>,
-        outputs: usize,
-    ) -> PyResult<Self> {
-        Self::start(&settings.params()?, &sample.as_array(), outputs)
-    }
-
-    /// For rows like those of `x` and `y`, on which settings that are to be chosen are searched for.
+    /// For rows like those of `x` and `y`, on which settings that are to be chosen are searched for; without any.
     #[staticmethod]
     fn prepare(
         py: Python<'_>,
@@ -280,7 +257,10 @@ impl Rows {
                     settings.with_alpha(&found)?.unwrap_or(found)
                 }
             };
-            Self::start(&params, &x, y.ncols())
+            let rows = Accumulator::from_sample(&params, &x, y.ncols()).map_err(error)?;
+            Ok(Self {
+                rows: rows.with_unlike_rows(true),
+            })
         })?
     }
 

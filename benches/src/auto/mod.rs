@@ -18,6 +18,8 @@ use problems::Problem;
 pub enum Subject {
     /// [`ElmParams::auto`], which chooses everything; the grid is over scale, strength and neurons.
     Auto,
+    /// Its quick level.
+    Quick,
     /// [`ElmParams::tuner`] with 200 neurons; the grid is over scale and strength.
     Given,
 }
@@ -28,6 +30,7 @@ impl Subject {
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",
+            Self::Quick => "quick",
             Self::Given => "tuner, 200 neurons",
         }
     }
@@ -35,13 +38,14 @@ impl Subject {
     fn tuner(self, seed: u64) -> Tuner<f64> {
         match self {
             Self::Auto => ElmParams::auto().with_seed(seed),
+            Self::Quick => ElmParams::auto().quick().with_seed(seed),
             Self::Given => base(200, seed).tuner(),
         }
     }
 
     fn sizes(self) -> &'static [usize] {
         match self {
-            Self::Auto => &[100, 400],
+            Self::Auto | Self::Quick => &[100, 400],
             Self::Given => &[200],
         }
     }
@@ -52,7 +56,7 @@ impl Subject {
 pub struct Record {
     /// The problem.
     pub problem: &'static str,
-    /// `auto`, or the tuner of a given layer.
+    /// `auto`, its quick level, or the tuner of a given layer.
     pub subject: &'static str,
     /// Of data and layers.
     pub seed: u64,

@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let subjects: &[Subject] = if arguments.auto_only {
         &[Subject::Auto]
     } else {
-        &[Subject::Auto, Subject::Given]
+        &[Subject::Auto, Subject::Quick, Subject::Given]
     };
     let mut records = Vec::new();
     if arguments.format == Format::Table {

@@ -123,6 +123,12 @@ class ElmBase(BaseEstimator):
             self._network = self._rows.fit(self._threads())
         return self._network
 
+    def _begin(self, rows):
+        """Start on rows in pieces."""
+        self._rows = rows
+        self._network = None
+        self._importances = None
+
     def _pieces(self):
         """What rows in pieces have left."""
         check_is_fitted(self)
@@ -217,9 +223,7 @@ class ElmBase(BaseEstimator):
     def _set_importances(self, network) -> None:
         self._importances = None
         if self.n_neurons == "auto":
-            scales = np.asarray(network.relevance, dtype=float)
-            if scales.size == 0:
-                scales = np.ones(self.n_features_in_)
+            scales = np.asarray(network.relevance)
             self._importances = scales / scales.sum()
 
     def to_onnx(self, path, double: bool = False) -> None:

@@ -164,11 +164,6 @@ class ElmClassifier(ClassifierMixin, ElmBase):
         self._begin(interruptible(self._work(X), ClassRows.prepare, *arguments))
         return self
 
-    def _begin(self, rows):
-        self._rows = rows
-        self._network = None
-        self._importances = None
-
     def _name_classes(self, classes):
         if isinstance(self.class_weight, str):
             raise ValueError(
@@ -224,7 +219,8 @@ class ElmClassifier(ClassifierMixin, ElmBase):
         codes = self._codes(y)
         weights = self._weights(X, sample_weight)
         if first:
-            self._begin(ClassRows(self._settings(partial=True), X, len(self.classes_)))
+            settings = self._settings(partial=True)
+            self._begin(ClassRows.prepare(settings, X, codes, len(self.classes_), None))
         self._rows.push(X, codes, weights, self._class_weights(), self._threads())
         self._network = None
         return self

@@ -48,7 +48,6 @@ class Network:
     def to_onnx(self, double: bool) -> bytes: ...
 
 class Rows:
-    def __new__(cls, settings: Settings, sample: NDArray[np.float64], outputs: int) -> Rows: ...
     def push(
         self,
         x: NDArray[np.float64],
@@ -97,7 +96,6 @@ class Classifier:
     def to_onnx(self, double: bool) -> bytes: ...
 
 class ClassRows:
-    def __new__(cls, settings: Settings, sample: NDArray[np.float64], classes: int) -> ClassRows: ...
     def push(
         self,
         x: NDArray[np.float64],

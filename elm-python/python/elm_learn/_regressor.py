@@ -155,15 +155,9 @@ class ElmRegressor(RegressorMixin, ElmBase):
         y = np.asarray(y, dtype=np.float64)
         targets = y[:, None] if y.ndim == 1 else y
         X, targets = self._arranged(X, targets)
-        rows = interruptible(self._work(X), Rows.prepare, settings, X, targets)
-        self._begin(rows, y.ndim == 1)
+        self._begin(interruptible(self._work(X), Rows.prepare, settings, X, targets))
+        self._single = y.ndim == 1
         return self
-
-    def _begin(self, rows, single):
-        self._rows = rows
-        self._single = single
-        self._network = None
-        self._importances = None
 
     def partial_fit(self, X, y, sample_weight=None):
         """Take in more rows; the memory that is needed does not grow with them.
@@ -193,7 +187,8 @@ class ElmRegressor(RegressorMixin, ElmBase):
         y = np.asarray(y, dtype=np.float64)
         targets = y[:, None] if y.ndim == 1 else y
         if first:
-            self._begin(Rows(self._settings(partial=True), X, targets.shape[1]), y.ndim == 1)
+            self._begin(Rows.prepare(self._settings(partial=True), X, targets))
+            self._single = y.ndim == 1
         self._rows.push(X, targets, weights, self._threads())
         self._network = None
         return self

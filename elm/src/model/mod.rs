@@ -218,7 +218,8 @@ impl<A: Scalar> ElmParams<A> {
     }
 
     /// The scale of each of so many inputs; where its [ramps](Self::with_embedding) have scales of their own,
-    /// the root of the sum of squares of them all.
+    /// the root of the sum of squares of them all. (Ramps between quantiles that are yet to be measured do not
+    /// count.)
     ///
     /// ```
     /// use elm::ElmParams;
@@ -242,7 +243,7 @@ impl<A: Scalar> ElmParams<A> {
                 }
                 squares.into_iter().map(f64::sqrt).collect()
             }
-            _ => scales.to_vec(),
+            _ => scales.iter().copied().take(inputs).collect(),
         }
     }
 

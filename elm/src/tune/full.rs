@@ -4,6 +4,7 @@
 use ndarray::{Array1, Array2, Axis};
 use rand::seq::SliceRandom;
 
+use super::attempt::surely_smaller;
 use super::metric::{Path, ROUNDS, Round, Seen, layer, wide};
 use super::rows::{chosen_rows, deviation};
 use super::{Trial, Tuner};
@@ -46,7 +47,7 @@ struct Candidate {
     round: usize,
     /// The mean of these, of an output.
     error: f64,
-    squares: Array1<f64>,
+    squares: Vec<f64>,
 }
 
 impl Candidate {
@@ -55,16 +56,11 @@ impl Candidate {
     fn best(candidates: Vec<Self>) -> Option<Self> {
         let usual = |candidate: &Self| candidate.ramps && candidate.round == 1;
         let usual = candidates.iter().position(usual).unwrap_or(0);
-        let known = candidates.get(usual)?;
-        let surely_better = |candidate: &Self| {
-            let gains = &known.squares - &candidate.squares;
-            let error = gains.std(0.0) / (gains.len() as f64).sqrt();
-            gains.mean().is_some_and(|mean| mean > error)
-        };
+        let known = &candidates.get(usual)?.squares;
         let mut best = usual;
         for (place, candidate) in candidates.iter().enumerate() {
             let wins = candidate.error < candidates[best].error * (1.0 - MARGIN);
-            if wins && surely_better(candidate) {
+            if wins && surely_smaller(&candidate.squares, known, 1.0) {
                 best = place;
             }
         }
@@ -191,7 +187,7 @@ impl FullSearch {
         if ramps { &self.embedded } else { &self.plain }
     }
 
-    /// The structure and number of rounds with the smallest held-out error.
+    /// The structure and number of rounds that errors of rows held out choose.
     fn candidates(&mut self, seed: u64) -> Result<Candidate> {
         let rows = self.plain.x.nrows();
         let mut order: Vec<usize> = (0..rows).collect();
@@ -227,14 +223,11 @@ impl FullSearch {
                 self.last[usize::from(ramps)] = Some(rounds.collect());
             }
             let complete = squares.into_iter().take_while(|own| own.len() == judged);
-            candidates.extend(complete.enumerate().map(|(round, squares)| {
-                let squares = Array1::from_vec(squares);
-                Candidate {
-                    ramps,
-                    round,
-                    error: squares.sum() / (judged as f64 * outputs),
-                    squares,
-                }
+            candidates.extend(complete.enumerate().map(|(round, squares)| Candidate {
+                ramps,
+                round,
+                error: squares.iter().sum::<f64>() / (judged as f64 * outputs),
+                squares,
             }));
         }
         Candidate::best(candidates).ok_or(crate::Error::NoConvergence {
@@ -333,4 +326,30 @@ impl FullSearch {
             what: "the search for a weight scale",
         })
     }
+}
+
+#[test]
+fn another_number_of_rounds_is_taken_only_where_it_is_surely_better() {
+    let of = |ramps, round, squares: [f64; 4]| Candidate {
+        ramps,
+        round,
+        error: squares.iter().sum::<f64>() / 4.0,
+        squares: squares.to_vec(),
+    };
+    let best = |others: [f64; 4]| {
+        let candidates = vec![
+            of(false, 0, others),
+            of(true, 0, [2.0; 4]),
+            of(true, 1, [1.0; 4]),
+        ];
+        let best = Candidate::best(candidates).unwrap();
+        (best.ramps, best.round)
+    };
+    assert_eq!(best([0.9, 0.8, 0.9, 0.8]), (false, 0));
+    // Better in the mean, by one row.
+    assert_eq!(best([0.0, 1.1, 1.1, 1.1]), (true, 1));
+    assert_eq!(best([0.999; 4]), (true, 1));
+    // Nothing has ramps: the first is the usual one.
+    assert!(!Candidate::best(vec![of(false, 0, [1.0; 4])]).unwrap().ramps);
+    assert!(Candidate::best(Vec::new()).is_none());
 }

@@ -6,8 +6,9 @@
 use ndarray::{Array1, Axis, s};
 
 use super::full::FEW_ROWS;
-use super::metric::{SLOPE_ROWS, by_slopes, spread, variances, wide};
+use super::metric::{SLOPE_ROWS, spread, variances, wide};
 use super::rows::deviation;
+use super::slopes::proportional;
 use crate::dataset::{Dataset, TargetDim};
 use crate::error::Result;
 use crate::model::ElmParams;
@@ -82,7 +83,7 @@ fn with_slopes<A: Scalar, D: TargetDim>(
             Some(weights) => own.t().dot(weights),
         };
     }
-    let scales = by_slopes(&squares)?;
+    let scales = proportional(&squares.mapv_into(f64::sqrt).to_vec(), 1.0)?;
     let weights = weights.as_ref().map(|weights| weights.view());
     let variances = variances(wide(u.view()).view(), weights);
     let before = match params.input_scales() {
@@ -120,4 +121,37 @@ fn deviations<A: Scalar, D: TargetDim>(data: &Dataset<'_, A, D>) -> Vec<f64> {
     columns
         .map(|t| deviation(t.mapv(Scalar::as_f64).view(), weights))
         .collect()
+}
+
+#[test]
+fn slopes_of_many_rows_find_the_input_that_matters() {
+    use crate::activation::Activation;
+    use crate::solve::Ridge;
+    use crate::{Embedding, Ramps};
+    use ndarray::Array2;
+
+    let x = Array2::from_shape_fn((1600, 4), |(row, input)| {
+        (row as f64 * [0.618_034, 0.414_214, 0.732_051, 0.236_068][input]).fract()
+    });
+    let t = x.column(1).mapv(|x| (8.0 * x).sin());
+    let ramps = Ramps::of(x.view(), None, 4);
+    let params = ElmParams::new(100)
+        .with_activation(Activation::Tanh)
+        .with_direct_links(true)
+        .with_embedding(Embedding::Ramps(ramps))
+        .with_solver(Ridge::leave_one_out());
+    let data = Dataset::new(&x, &t).unwrap();
+    let once = params.fit_dataset(&data).unwrap();
+    let (found, twice) = fit_twice(params.clone(), &data).unwrap();
+    assert!(left_out(&twice, &data) < (1.0 - MARGIN) * left_out(&once, &data));
+    let relevance = found.relevance(4);
+    let others = [0, 2, 3].map(|other| relevance[other]);
+    assert!(
+        others.iter().all(|other| relevance[1] > 2.0 * other),
+        "{relevance:?}"
+    );
+    // Few rows keep what the search gave them.
+    let few = (x.slice(s![..400, ..]), t.slice(s![..400]));
+    let data = Dataset::new(&few.0, &few.1).unwrap();
+    assert_eq!(fit_twice(params.clone(), &data).unwrap().0, params);
 }

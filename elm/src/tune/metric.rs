@@ -14,6 +14,7 @@
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
 
 use super::Trial;
+use super::slopes::proportional;
 use crate::activation::Activation;
 use crate::bounds::Bounds;
 use crate::error::{Error, Result};
@@ -24,8 +25,6 @@ use crate::stats::Moments;
 
 /// Rounds at most.
 pub(super) const ROUNDS: usize = 3;
-/// The smallest scale of a column relative to the largest when slopes decide.
-const LEAST_RELEVANCE: f64 = 0.01;
 /// Rows at which slopes are taken.
 pub(super) const SLOPE_ROWS: usize = 1000;
 /// Root mean square weighted sums that the first round tries; a factor of 2 apart.
@@ -332,21 +331,8 @@ impl<'a> Path<'a> {
                 Some(weights) => slopes.t().dot(weights),
             };
         }
-        by_slopes(&squares)
+        proportional(&squares.mapv_into(f64::sqrt).to_vec(), 1.0)
     }
-}
-
-/// Scales of columns in proportion to the slopes along them, of which these are the sums of squares; nothing
-/// where there are no slopes.
-pub(super) fn by_slopes(squares: &Array1<f64>) -> Option<Vec<f64>> {
-    let largest = squares.iter().copied().fold(0.0, f64::max).sqrt();
-    if !(largest > 0.0 && largest.is_finite()) {
-        return None;
-    }
-    let relevance = |square: &f64| (square.sqrt() / largest).max(LEAST_RELEVANCE);
-    let scales: Vec<f64> = squares.iter().map(relevance).collect();
-    let mean = scales.iter().map(|s| s * s).sum::<f64>() / scales.len() as f64;
-    Some(scales.iter().map(|scale| scale / mean.sqrt()).collect())
 }
 
 /// The root mean square weighted sum of what neurons see, for weights of deviation 1 times those scales.
@@ -373,4 +359,23 @@ pub(super) fn variances(
 /// Widened rows of a matrix.
 pub(super) fn wide<A: crate::Scalar>(matrix: ArrayView2<'_, A>) -> Array2<f64> {
     matrix.mapv(crate::Scalar::as_f64)
+}
+
+#[test]
+fn a_row_far_outside_is_judged_as_the_fitted_network_would_predict_it() {
+    let mut x = Array2::from_shape_fn((121, 2), |(row, input)| {
+        (row as f64 * [0.618_034, 0.414_214][input]).fract()
+    });
+    let targets = x.map_axis(Axis(1), |x| 5.0 * x[0] + x[1]);
+    let targets = targets.insert_axis(Axis(1));
+    x[[120, 0]] = 30.0;
+    let rows: Vec<usize> = (0..120).collect();
+    let error = |bounded| {
+        let seen = Seen::new(x.clone(), targets.clone(), None, Some(8), 1).with_bounded(bounded);
+        let mut path = Path::new(&seen, rows.clone(), 50, 100).unwrap();
+        path.run(1, &[120]).unwrap().last().unwrap().1[0]
+    };
+    // Targets lie between 0 and 6, and predictions within a quarter more on either side.
+    assert!(error(true) <= 7.5_f64.powi(2), "{}", error(true));
+    assert!(error(false) > 100.0_f64.powi(2), "{}", error(false));
 }

@@ -57,11 +57,13 @@
 //! # Ok::<(), elm::Error>(())
 //! ```
 
+mod attempt;
 mod full;
 mod late;
 mod metric;
 mod rows;
 mod search;
+mod slopes;
 
 use ndarray::Ix2;
 #[cfg(feature = "serde")]
@@ -95,14 +97,13 @@ pub enum Criterion {
 }
 
 /// How much a [`Tuner`] looks for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Level {
     /// The scale of the weights and, where wanted, of each input, neurons and direct links: step by
     /// step, each by exact held-out errors.
-    #[default]
     Quick,
     /// Ramps along the inputs, and a scale for each, learned from slopes in rounds whose number is chosen on
     /// rows that the slopes have not seen. For rows that may be held out one by one: where they have

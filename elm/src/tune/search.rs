@@ -4,7 +4,9 @@ use std::collections::HashMap;
 
 use ndarray::{Array1, Array2, ArrayView2, Axis, Ix2};
 
+use super::attempt::{Attempt, links_pay, neurons_pay, scale_pays, step_pays};
 use super::rows::{chosen_rows, deviation};
+use super::slopes::proportional;
 use super::{Trial, Tuner};
 use crate::cross_validation::check_several;
 use crate::dataset::{Dataset, Rows, TargetDim};
@@ -15,8 +17,6 @@ use crate::threads;
 
 /// Neurons that the search uses as long as their number is not chosen.
 const SEARCH_NEURONS: usize = 100;
-/// Relative gain below which more neurons, or another scale for an input, do not pay.
-const MIN_GAIN: f64 = 0.01;
 /// Coarse steps of the scale: half a decade.
 const COARSE: f64 = 0.5;
 /// What a held-out error at a scale below the center counts more for, for each decade.
@@ -25,41 +25,8 @@ const PER_DECADE: f64 = 0.06;
 const MIN_STEP: f64 = 0.1;
 /// Factorizations that are kept for choosing the number of neurons, where that is to be chosen.
 const FOR_NEURONS: usize = 9;
-/// The smallest scale of an input relative to the largest when slopes decide.
-const MIN_RELEVANCE: f64 = 0.01;
 /// Rows at which slopes are taken.
 const SLOPE_ROWS: usize = 500;
-
-/// A trial, with the held-out error of each row.
-struct Attempt {
-    trial: Trial,
-    /// Squared, relative to each output's variance, mean over outputs; times the weight of the row over
-    /// the mean weight.
-    squares: Vec<f64>,
-    /// What the score counts for, over what it is: above 1 for small scales.
-    price: f64,
-}
-
-impl Attempt {
-    /// Whether the errors are smaller by more than `standard_errors` standard errors of the difference.
-    fn improves_on(&self, other: &Self, standard_errors: f64) -> bool {
-        let priced = |attempt: &Self| attempt.trial.score * attempt.price;
-        if priced(self) >= priced(other) * (1.0 - MIN_GAIN) {
-            return false;
-        }
-        let gains = || {
-            other
-                .squares
-                .iter()
-                .zip(&self.squares)
-                .map(|(old, new)| old - new)
-        };
-        let rows = self.squares.len() as f64;
-        let mean = gains().sum::<f64>() / rows;
-        let variance = gains().map(|gain| (gain - mean).powi(2)).sum::<f64>() / rows;
-        mean > standard_errors * (variance / rows).sqrt()
-    }
-}
 
 /// What is tried: neurons, exponent of the scale, scales of inputs, direct links; numbers by their bits.
 #[derive(Clone, PartialEq, Eq, Hash)]
@@ -264,7 +231,9 @@ impl<'a, A: Scalar> Search<'a, A> {
             let mut moved = false;
             let exponent = now.scale.log10();
             let both = [1.0, 0.5].map(|power| proportional(&slopes, power));
-            self.look_ahead(both.clone().map(|scales| (now.neurons, exponent, scales)));
+            let both: Vec<_> = both.into_iter().flatten().collect();
+            let ahead = both.iter().cloned();
+            self.look_ahead(ahead.map(|scales| (now.neurons, exponent, scales)));
             for scales in both {
                 moved |= self.move_if(now.neurons, exponent, &scales, |new, old| {
                     new.improves_on(old, 1.0 + penalty)
@@ -510,33 +479,4 @@ impl<'a, A: Scalar> Search<'a, A> {
             price,
         })
     }
-}
-
-/// The search begins at the scale that suits most problems, and leaves it for a reason: small scales
-/// make networks that are nearly polynomials, whose errors at the edge of the data few rows show.
-fn scale_pays(new: &Attempt, old: &Attempt) -> bool {
-    new.improves_on(old, 1.5)
-}
-
-fn neurons_pay(new: &Attempt, old: &Attempt) -> bool {
-    new.improves_on(old, 1.0)
-}
-
-fn links_pay(new: &Attempt, old: &Attempt) -> bool {
-    new.improves_on(old, 0.5)
-}
-
-fn step_pays(new: &Attempt, old: &Attempt) -> bool {
-    new.improves_on(old, 0.5)
-}
-
-/// Scales in proportion to a power of the slopes, so that a weighted sum keeps its size.
-fn proportional(slopes: &[f64], power: f64) -> Vec<f64> {
-    let largest = slopes.iter().copied().fold(0.0, f64::max);
-    let relative = slopes
-        .iter()
-        .map(|s| (s / largest).max(MIN_RELEVANCE).powf(power));
-    let relative: Vec<f64> = relative.collect();
-    let mean_square = relative.iter().map(|s| s * s).sum::<f64>() / relative.len() as f64;
-    relative.iter().map(|s| s / mean_square.sqrt()).collect()
 }
