@@ -239,7 +239,8 @@ pub(crate) struct Rows {
 
 #[pymethods]
 impl Rows {
-    /// For rows like those of `x` and `y`, on which settings that are to be chosen are searched for; without any.
+    /// An accumulation for rows like those of `x` and `y`, without any row yet. Settings that are to be
+    /// chosen are chosen on these rows.
     #[staticmethod]
     fn prepare(
         py: Python<'_>,

@@ -68,6 +68,12 @@ pub(crate) fn all() -> Result {
         "cargo clippy --workspace --all-targets --locked -- -D warnings",
     ))?;
 
+    // Before the tests, which take most of the time: these are what is forgotten most easily.
+    step("rules for text and for imports");
+    run(command(
+        "cargo test --workspace --test style --test imports --locked",
+    ))?;
+
     step("tests, as the README runs them, and those that need something from outside");
     if has_data {
         Tiers::everything().run()?;

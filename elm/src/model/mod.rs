@@ -217,9 +217,9 @@ impl<A: Scalar> ElmParams<A> {
         &self.map.input_scales
     }
 
-    /// The scale of each of so many inputs; where its [ramps](Self::with_embedding) have scales of their own,
-    /// the root of the sum of squares of them all. (Ramps between quantiles that are yet to be measured do not
-    /// count.)
+    /// The scale of each of `inputs` inputs. Where the [ramps](Self::with_embedding) of an input have
+    /// scales of their own, it is the root of the sum of their squares. Ramps between quantiles that are
+    /// not measured yet do not count.
     ///
     /// ```
     /// use elm::ElmParams;
