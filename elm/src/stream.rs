@@ -24,6 +24,8 @@ pub enum Stream {
     Folds,
     /// Rows that a search over settings looks at.
     SearchRows,
+    /// Permutations of an input's values, by its index.
+    Permutations(u32),
     /// Uses of a program's own, by a number that it gives each of them.
     Application(u32),
 }
@@ -37,6 +39,8 @@ impl Stream {
             Self::Rows(group) => 4 * u64::from(group) + 2,
             Self::Folds => 1,
             Self::SearchRows => 3,
+            // Above those of applications.
+            Self::Permutations(input) => (1 << 40) + 2 * u64::from(input) + 1,
             Self::Application(number) => 2 * u64::from(number) + 5,
         }
     }

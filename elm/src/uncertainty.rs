@@ -30,6 +30,8 @@
 //! groups' held-out errors (CV+ in the same paper, not studentized), and $\sigma^2$ is the mean square of
 //! those.
 //!
+//! [`UncertainElm::permutation_importance`] says how much of the leave-one-out $R^2$ hangs on each input.
+//!
 //! [`UncertainElm::compact`] leaves the rows out: what remains fits in a file, has the same deviations, and
 //! has the jackknife's intervals.
 //!
@@ -56,6 +58,7 @@ mod compact;
 mod counted_rows;
 #[cfg(feature = "persist")]
 mod files;
+mod importance;
 mod interval;
 
 use ndarray::{Array, Array1, Array2, ArrayRef2, Axis, Ix2, Zip, s};
@@ -63,6 +66,7 @@ use ndarray::{Array, Array1, Array2, ArrayRef2, Axis, Ix2, Zip, s};
 use crate::cross_validation::CrossValidator;
 use crate::dataset::{Dataset, Inputs, TargetDim, per_output};
 use crate::error::{Error, Result};
+use crate::feature_map::FeatureMap;
 use crate::model::ElmParams;
 use crate::network::Elm;
 use crate::scalar::Scalar;
@@ -130,6 +134,21 @@ impl<A: Scalar> ElmParams<A> {
         UncertainElm::new((vec![member], vec![left_out]), data)
     }
 
+    /// As [`fit_uncertain`](Self::fit_uncertain), of a feature map that is there already, as
+    /// [`fit_map`](Self::fit_map): of a network from a file, say, whose rows are at hand again.
+    ///
+    /// # Errors
+    /// Those of [`fit_uncertain`](Self::fit_uncertain) and [`fit_map`](Self::fit_map).
+    pub fn fit_map_uncertain<D: TargetDim>(
+        &self,
+        map: FeatureMap<A>,
+        data: &Dataset<'_, A, D>,
+    ) -> Result<UncertainElm<A, D>> {
+        self.check_ridge()?;
+        let (member, left_out) = self.uncertain_member(self.fit_map(map, data)?, data)?;
+        UncertainElm::new((vec![member], vec![left_out]), data)
+    }
+
     /// Fits the mean of this many networks, which differ in their seeds alone: the parameters' seed
     /// and those that follow it. What their random layers do badly, each elsewhere, averages out.
     ///
@@ -183,13 +202,25 @@ impl<A: Scalar> ElmParams<A> {
         &self,
         data: &Dataset<'_, A, D>,
     ) -> Result<(Member<A, D>, LeftOut<A>)> {
-        if !matches!(self.solver(), Solver::Ridge(_)) {
-            return Err(Error::Conflict {
-                first: "a solver other than ridge",
-                second: "uncertainty",
-            });
+        self.check_ridge()?;
+        self.uncertain_member(self.fit_dataset(data)?, data)
+    }
+
+    fn check_ridge(&self) -> Result<()> {
+        if matches!(self.solver(), Solver::Ridge(_)) {
+            return Ok(());
         }
-        let model = self.fit_dataset(data)?;
+        Err(Error::Conflict {
+            first: "a solver other than ridge",
+            second: "uncertainty",
+        })
+    }
+
+    fn uncertain_member<D: TargetDim>(
+        &self,
+        model: Elm<A, D>,
+        data: &Dataset<'_, A, D>,
+    ) -> Result<(Member<A, D>, LeftOut<A>)> {
         let hidden = model.hidden_matrix(&data.inputs())?;
         let weights = data.weights();
         let problem = self.problem(&hidden, data.target_matrix(), weights.as_ref())?;

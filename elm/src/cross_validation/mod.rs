@@ -40,24 +40,26 @@
 mod evidence;
 mod fold;
 mod fold_predictions;
+mod influence;
 mod posterior;
 mod predictions;
 
 use std::marker::PhantomData;
 
-use ndarray::{Array1, Array2, ArrayRef2, Axis, Zip};
+use ndarray::{Array1, Array2, Axis, Zip};
 
 use crate::check::check_length;
 pub use crate::dataset::{assign_blocks, assign_folds};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
-use crate::solve::design_svd::{DesignSvd, DesignSvdWithRows};
+use crate::solve::design_svd::DesignSvdWithRows;
 use crate::solve::lambda_grid::coarse_grid;
 use crate::solve::ridge::{TOLERANCE, ridge_solution};
 use crate::solve::{Lambda, LeastSquares, Reason, Ridge, Solution, in_range};
 use fold::Fold;
 pub(crate) use fold::check_several;
 pub use fold_predictions::FoldPredictions;
+pub(crate) use influence::Shifts;
 pub(crate) use posterior::Posterior;
 pub use predictions::{CvPredictions, LambdaPath};
 
@@ -185,22 +187,6 @@ impl<A: Scalar> CrossValidator<A> {
     /// What variances of predictions need, without the rows.
     pub(crate) fn posterior(&self) -> Posterior<A> {
         Posterior::of(&self.rows.spectrum, self.constant_share())
-    }
-
-    /// $1/n + \tilde h^T (\tilde H^T \tilde H + \lambda)^{-1} \tilde h_i$ for one new hidden row and every
-    /// training row $i$, times its weight: leaving out row $i$ lowers the prediction by its leave-one-out
-    /// residual times this; leaving out several, by the sum of their held-out residuals times these.
-    pub(crate) fn influence(&self, hidden: &ArrayRef2<A>, lambda: f64) -> Array1<A> {
-        let DesignSvd { frame, vt, .. } = &self.rows.spectrum;
-        let mean = frame.hidden_mean.mapv(|m| m / frame.hidden_scale);
-        let (inside, _) = posterior::coordinates(hidden, frame.hidden_scale, &mean, vt);
-        let gain = self.rows.spectrum.ridge_gain(&[A::from_f64(lambda)]);
-        let along = &inside.row(0) * &gain.column(0);
-        let share = self.constant_share();
-        let roots = &self.rows.spectrum.frame.root_weights;
-        Zip::from(&self.rows.u.dot(&along))
-            .and(roots)
-            .map_collect(|&along, &root| root * (along + root * share))
     }
 
     /// What is predicted for each row by the fit to all others.

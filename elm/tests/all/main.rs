@@ -14,6 +14,7 @@ mod csv_example;
 mod dataset;
 mod exchangeable;
 mod hostile;
+mod importance;
 mod many_rows;
 mod persist;
 mod prune;
