@@ -153,6 +153,29 @@ fn what_a_renderer_cannot_take_is_refused_in_one_line_and_nothing_is_left() {
         &glsl,
     );
     assert!(said.contains(".bsdf"), "{said}");
+    let said = refused(
+        &program,
+        &["export", &model, "-o", &glsl, "--double"],
+        &glsl,
+    );
+    assert!(said.contains(".onnx"), "{said}");
+    let onnx = path("out.onnx");
+    let size = |extra: &[&str]| {
+        let arguments = ["export", &path("four.elm"), "-o", &onnx];
+        program
+            .command()
+            .args(arguments)
+            .args(extra)
+            .assert()
+            .success();
+        std::fs::read(&onnx).unwrap()
+    };
+    // Whether they say what the model says, the Python package's tests find out.
+    for bytes in [size(&[]), size(&["--double"])] {
+        for word in [&b"light"[..], b"viewer", b"values", b"400nm"] {
+            assert!(bytes.windows(word.len()).any(|found| found == word));
+        }
+    }
     for name in ["four.elm", "grey.elm"] {
         let arguments = [
             "export",

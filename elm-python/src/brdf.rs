@@ -10,8 +10,10 @@ use ndarray::{Array1, Array2, ArrayView1};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 use crate::pool::on_threads;
+use crate::regressor::precision;
 use crate::settings::error;
 
 /// A fitted reflectance model.
@@ -168,6 +170,11 @@ impl Brdf {
 
     fn save(&self, py: Python<'_>, path: std::path::PathBuf) -> PyResult<()> {
         py.detach(|| self.model.save(path)).map_err(error)
+    }
+
+    fn to_onnx<'py>(&self, py: Python<'py>, double: bool) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = elm_brdf::export::onnx(&self.model, precision(double)).map_err(error)?;
+        Ok(PyBytes::new(py, &bytes))
     }
 
     #[getter]

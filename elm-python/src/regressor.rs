@@ -5,14 +5,14 @@ use std::sync::OnceLock;
 use elm::persist;
 use elm::uncertainty::CompactUncertainElm;
 use elm::{Accumulator, Dataset, Elm, Predictor, Scalar, onnx};
-use ndarray::{Array2, ArrayView1, ArrayView2, Axis, Ix2, concatenate};
-use numpy::{PyReadonlyArray1, PyReadonlyArray2};
+use ndarray::{Array2, ArrayView2, Axis, Ix2, concatenate};
+use numpy::{IntoPyArray, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::pool::on_threads;
-use crate::scalars::{Either, either, on_rows};
+use crate::scalars::{Either, either, on_dataset, on_rows};
 use crate::settings::{Recipe, Settings, error};
 
 /// A network with its weights packed on first use.
@@ -55,31 +55,40 @@ impl<A: Scalar> Packed<A> {
 
 fn fit<A: Scalar>(
     settings: &Settings,
-    x: ArrayView2<'_, A>,
-    y: ArrayView2<'_, A>,
-    weights: Option<ArrayView1<'_, A>>,
+    data: &Dataset<'_, A, Ix2>,
     intervals: bool,
 ) -> PyResult<Packed<A>> {
-    let mut data: Dataset<'_, A, Ix2> = Dataset::new(&x, &y).map_err(error)?;
-    if let Some(weights) = &weights {
-        data = data.with_weights(weights).map_err(error)?;
-    }
     let (model, params) = match settings.recipe()? {
-        Recipe::Given(params) => (params.fit_dataset(&data).map_err(error)?, params),
+        Recipe::Given(params) => (params.fit_dataset(data).map_err(error)?, params),
         Recipe::Search(tuner) => {
-            let tuned = tuner.tune(&data).map_err(error)?;
+            let tuned = tuner.tune(data).map_err(error)?;
             match settings.with_alpha(&tuned.params)? {
-                Some(params) => (params.fit_dataset(&data).map_err(error)?, params),
+                Some(params) => (params.fit_dataset(data).map_err(error)?, params),
                 None => (tuned.model, tuned.params),
             }
         }
     };
     let mut packed = Packed::of(model);
-    packed.relevance = params.relevance(x.ncols());
+    packed.relevance = params.relevance(data.inputs().ncols());
     if intervals {
-        packed.uncertain = Some(params.fit_uncertain(&data).map_err(error)?.compact());
+        packed.uncertain = Some(params.fit_uncertain(data).map_err(error)?.compact());
     }
     Ok(packed)
+}
+
+fn importance<A: Scalar>(
+    settings: &Settings,
+    model: &Elm<A>,
+    data: &Dataset<'_, A, Ix2>,
+    repeats: usize,
+    seed: u64,
+) -> PyResult<Array2<f64>> {
+    let params = settings.params::<A>()?;
+    let uncertain = params.fit_map_uncertain(model.map().clone(), data);
+    let falls = uncertain
+        .and_then(|uncertain| uncertain.permutation_importance(data, repeats, seed))
+        .map_err(error)?;
+    Ok(falls.mean_axis(Axis(1)).unwrap_or_default())
 }
 
 type Kind = Either<Packed<f32>, Packed<f64>>;
@@ -103,21 +112,15 @@ impl Network {
         weights: Option<&Bound<'_, PyAny>>,
         intervals: bool,
     ) -> PyResult<Self> {
-        let kind = if let Ok(x) = x.extract::<PyReadonlyArray2<'_, f64>>() {
-            let y = y.extract::<PyReadonlyArray2<'_, f64>>()?;
-            let w: Option<PyReadonlyArray1<'_, f64>> = weights.map(|w| w.extract()).transpose()?;
-            let (x, y, w) = (x.as_array(), y.as_array(), w.as_ref().map(|w| w.as_array()));
-            Kind::F64(on_threads(py, settings.threads, || {
-                fit(settings, x, y, w, intervals)
-            })??)
+        let threads = settings.threads;
+        let kind = if x.cast::<PyArray2<f64>>().is_ok() {
+            Kind::F64(on_dataset(py, threads, (x, y), weights, |data| {
+                fit(settings, data, intervals)
+            })?)
         } else {
-            let x = x.extract::<PyReadonlyArray2<'_, f32>>()?;
-            let y = y.extract::<PyReadonlyArray2<'_, f32>>()?;
-            let w: Option<PyReadonlyArray1<'_, f32>> = weights.map(|w| w.extract()).transpose()?;
-            let (x, y, w) = (x.as_array(), y.as_array(), w.as_ref().map(|w| w.as_array()));
-            Kind::F32(on_threads(py, settings.threads, || {
-                fit(settings, x, y, w, intervals)
-            })??)
+            Kind::F32(on_dataset(py, threads, (x, y), weights, |data| {
+                fit(settings, data, intervals)
+            })?)
         };
         Ok(Self { kind })
     }
@@ -156,6 +159,29 @@ impl Network {
         either!(&self.kind, model => {
             let model = model.uncertain()?;
             on_rows(py, x, 1, |x| model.predict_deviation(&x).map_err(error))
+        })
+    }
+
+    /// By how much the leave-one-out R2 falls where an input has the values of other rows, shape
+    /// (inputs, repeats), the mean over outputs. The rows are those of the fit; output weights are solved for
+    /// again.
+    #[pyo3(signature = (settings, x, y, weights, repeats, seed))]
+    #[expect(clippy::too_many_arguments, reason = "Python passes them by position")]
+    fn permutation_importance<'py>(
+        &self,
+        py: Python<'py>,
+        settings: &Settings,
+        x: &Bound<'py, PyAny>,
+        y: &Bound<'py, PyAny>,
+        weights: Option<&Bound<'py, PyAny>>,
+        repeats: usize,
+        seed: u64,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        either!(&self.kind, model => {
+            let falls = on_dataset(py, settings.threads, (x, y), weights, |data| {
+                importance(settings, &model.model, data, repeats, seed)
+            })?;
+            Ok(falls.into_pyarray(py))
         })
     }
 

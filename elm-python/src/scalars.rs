@@ -1,8 +1,9 @@
 //! Models and arrays of either scalar type.
 
 use elm::persist::{self, Persist};
-use ndarray::{Array2, ArrayView2};
-use numpy::{Element, IntoPyArray, PyReadonlyArray2};
+use elm::{Dataset, Scalar};
+use ndarray::{Array2, ArrayView2, Ix2};
+use numpy::{Element, IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::pool::on_threads;
@@ -63,4 +64,26 @@ pub(crate) fn on_rows<'py, A: Element + Sync>(
     let x = x.as_array();
     let values = on_threads(py, threads, || evaluate(x))??;
     Ok(values.into_pyarray(py).into_any())
+}
+
+/// What `work` makes of rows with targets and perhaps weights, the interpreter's lock released meanwhile.
+pub(crate) fn on_dataset<A: Element + Scalar, R: Send>(
+    py: Python<'_>,
+    threads: usize,
+    (x, y): (&Bound<'_, PyAny>, &Bound<'_, PyAny>),
+    weights: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&Dataset<'_, A, Ix2>) -> PyResult<R> + Send,
+) -> PyResult<R> {
+    let x = x.extract::<PyReadonlyArray2<'_, A>>()?;
+    let y = y.extract::<PyReadonlyArray2<'_, A>>()?;
+    let weights: Option<PyReadonlyArray1<'_, A>> = weights.map(|w| w.extract()).transpose()?;
+    let (x, y) = (x.as_array(), y.as_array());
+    let weights = weights.as_ref().map(|w| w.as_array());
+    on_threads(py, threads, || {
+        let mut data = Dataset::new(&x, &y).map_err(error)?;
+        if let Some(weights) = &weights {
+            data = data.with_weights(weights).map_err(error)?;
+        }
+        work(&data)
+    })?
 }

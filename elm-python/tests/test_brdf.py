@@ -1,6 +1,9 @@
 """Reflectance models."""
 
+import json
+
 import numpy as np
+import onnxruntime
 import pytest
 
 from elm_learn import brdf
@@ -53,3 +56,51 @@ def test_samples_have_the_density_that_pdf_gives_and_its_integral_is_one():
     np.testing.assert_allclose(by_lobes, by_uniform, rtol=0.05)
     with pytest.raises(ValueError, match="u must have shape"):
         model.sample(viewer, u[:, :1])
+
+
+def highlight(wi, wo, roughness):
+    half = (wi + wo) / np.linalg.norm(wi + wo, axis=1, keepdims=True)
+    return np.exp(-(half[:, 0] ** 2 / roughness[0] + half[:, 1] ** 2 / roughness[1]) / half[:, 2] ** 2)
+
+
+def materials():
+    wi, wo = directions(600, 7), directions(600, 8)
+    noise = 1 + 0.01 * np.random.default_rng(9).normal(size=(600, 1))
+    one = 0.1 + 2 * highlight(wi, wo, (0.1, 0.1))[:, None]
+    yield "one channel", wi, wo, one
+    yield "not reciprocal", wi, wo, one * (1 + 0.5 * wi[:, 2:]) * noise
+    yield "a grain", wi, wo, 0.1 + 2 * highlight(wi, wo, (0.02, 0.2))[:, None] * np.ones(3)
+    yield "many channels", wi, wo, one * np.linspace(0.5, 1.5, 8) + 0.1 * wi[:, 2:] * np.linspace(0, 1, 8) ** 2
+
+
+def evaluated(path, wi, wo):
+    session = onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
+    kind = np.float64 if "double" in session.get_inputs()[0].type else np.float32
+    (values,) = session.run(["values"], {"light": wi.astype(kind), "viewer": wo.astype(kind)})
+    return values, session.get_modelmeta().custom_metadata_map
+
+
+def test_onnx_graphs_have_the_values_of_the_model(tmp_path):
+    wi, wo = directions(10_000, 10), directions(10_000, 11)
+    # Below the horizon, at it, both directions one, a mirror's, along the normal.
+    n = np.array([0.0, 0.0, 1.0])
+    wi[:5] = [-n, [1, 0, 0], wi[2], wi[3], n]
+    wo[2:5] = [wi[2], wi[3] * [-1, -1, 1], n]
+    kinds = set()
+    for name, *fitted_to in materials():
+        model = brdf.fit(*fitted_to, n_neurons=40)
+        kinds.add(model.is_isotropic)
+        model.save(tmp_path / "model.json")
+        contents = json.loads((tmp_path / "model.json").read_text())["contents"]
+        kinds.add(json.dumps(contents["features"]))
+        values = model.eval(wi, wo)
+        for double, tolerance in ((True, 1e-12), (False, 1e-6)):
+            model.to_onnx(tmp_path / "model.onnx", double=double)
+            found, about = evaluated(tmp_path / "model.onnx", wi, wo)
+            if not double:
+                values = model.eval(wi.astype(np.float32), wo.astype(np.float32))
+            assert np.abs(found - values).max() <= tolerance * values.max(), (name, double)
+            assert (found[:2] == 0).all()
+            assert about["channels"] == ""
+    # Reciprocal, not reciprocal, with a grain.
+    assert True in kinds and False in kinds and len(kinds) >= 4, kinds

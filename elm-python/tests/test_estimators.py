@@ -8,6 +8,7 @@ import threading
 import joblib
 import numpy as np
 import pytest
+from sklearn import inspection
 from sklearn.datasets import load_diabetes, load_iris, make_classification
 from sklearn.exceptions import NotFittedError
 from sklearn.metrics import log_loss
@@ -46,6 +47,27 @@ def test_leave_one_out_score_is_near_the_test_score(curve):
     assert abs(model.loo_score_ - model.score(X[200:], y[200:])) < 0.02
     assert model.feature_importances_.shape == (2,)
     assert abs(model.feature_importances_.sum() - 1) < 1e-12
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_permutation_importance_finds_what_matters(dtype):
+    random = np.random.default_rng(1)
+    X = random.uniform(-1, 1, (300, 3)).astype(dtype)
+    y = np.sin(3 * X[:, 0]) + 0.3 * X[:, 1] + 0.05 * random.normal(size=300)
+    weights = random.uniform(0.5, 1.5, 300)
+    for model in (ElmRegressor(60, random_state=0), ElmRegressor(random_state=0)):
+        model.fit(X, y, sample_weight=weights)
+        found = pickle.loads(pickle.dumps(model)).permutation_importance(X, y, weights, n_repeats=4)
+        assert found.importances.shape == (3, 4)
+        first, second, third = found.importances_mean
+        assert first > 1.5 and 0.05 < second < 0.3 and abs(third) < 0.01
+        # Close to what scikit-learn finds on rows that the model has not seen.
+        X_new = random.uniform(-1, 1, (1000, 3)).astype(dtype)
+        y_new = np.sin(3 * X_new[:, 0]) + 0.3 * X_new[:, 1] + 0.05 * random.normal(size=1000)
+        theirs = inspection.permutation_importance(model, X_new, y_new, random_state=0)
+        np.testing.assert_allclose(found.importances_mean, theirs.importances_mean, rtol=0.15, atol=0.01)
+    with pytest.raises(ValueError, match="n_repeats must be at least 1"):
+        model.permutation_importance(X, y, n_repeats=0)
 
 
 def test_intervals_cover_and_deviations_grow_outside(curve):

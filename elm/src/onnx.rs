@@ -1,9 +1,10 @@
 //! Networks as ONNX files (feature `onnx`), for any runtime that reads these: onnxruntime and others.
 //!
-//! A graph has one input `x` of shape (rows, inputs), rows free, and for a network one output `y` of shape
-//! (rows, outputs), for a classifier `label` (the index of the class) and `probabilities` (rows, classes).
-//! All is computed in double precision, whatever the types of inputs and outputs are, as sums of hundreds of
-//! neurons cancel; inputs and predictions are held to the network's [bounds](crate::bounds).
+//! The graph of a [`network`] or [`classifier`] has one input `x` of shape (rows, inputs), rows free. A
+//! network has one output `y` of shape (rows, outputs); a classifier has `label`, the index of the class, and
+//! `probabilities` of shape (rows, classes). All is computed in double precision, whatever the types of
+//! inputs and outputs are, as sums of hundreds of neurons cancel; inputs and predictions are held to the
+//! network's [bounds](crate::bounds). A [`Graph`] of one's own puts more around a network.
 //!
 //! ```
 //! use elm::{ElmParams, onnx};
@@ -28,7 +29,7 @@ use crate::error::{Error, Result};
 use crate::feature_map::NeuronBlock;
 use crate::network::Elm;
 use crate::scalar::Scalar;
-use graph::Graph;
+pub use graph::{Graph, Value};
 
 /// The type of a graph's inputs and outputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -48,8 +49,9 @@ pub fn network<A: Scalar, D: TargetDim>(
     model: &Elm<A, D>,
     precision: Precision,
 ) -> Result<Vec<u8>> {
-    let mut graph = Graph::new(precision, model.inputs());
-    let y = scores(&mut graph, model)?;
+    let mut graph = Graph::new(precision);
+    let x = graph.input("x", model.inputs());
+    let y = graph.network(model, &x)?;
     graph.output("y", &y, model.outputs());
     Ok(graph.finish())
 }
@@ -62,8 +64,9 @@ pub fn classifier<A: Scalar, L: Ord + Clone>(
     model: &ElmClassifier<A, L>,
     precision: Precision,
 ) -> Result<Vec<u8>> {
-    let mut graph = Graph::new(precision, model.model().inputs());
-    let mut z = scores(&mut graph, model.model())?;
+    let mut graph = Graph::new(precision);
+    let x = graph.input("x", model.model().inputs());
+    let mut z = graph.network(model.model(), &x)?;
     let (calibration, classes) = (model.calibration(), model.classes().len());
     let shifts = calibration.shifts();
     if classes == 2 {
@@ -89,10 +92,14 @@ pub fn classifier<A: Scalar, L: Ord + Clone>(
 }
 
 /// The nodes of a network's predictions, held to their bounds.
-fn scores<A: Scalar, D: TargetDim>(graph: &mut Graph, model: &Elm<A, D>) -> Result<String> {
+fn predictions<A: Scalar, D: TargetDim>(
+    graph: &mut Graph,
+    model: &Elm<A, D>,
+    x: &Value,
+) -> Result<Value> {
     let wide =
         |values: ArrayView1<'_, A>| -> Vec<f64> { values.iter().map(|v| v.as_f64()).collect() };
-    let mut x = graph.input();
+    let mut x = x.clone();
     let held = model.bounds().filter(|bounds| bounds.are_held());
     if let Some(bounds) = held {
         let (lower, upper) = bounds.held_inputs();
@@ -121,11 +128,8 @@ fn scores<A: Scalar, D: TargetDim>(graph: &mut Graph, model: &Elm<A, D>) -> Resu
     if model.map().direct_links() {
         parts.push(x);
     }
-    let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
-    let h = match parts.as_slice() {
-        [one] => (*one).to_owned(),
-        several => graph.along("Concat", several, 1, None),
-    };
+    let parts: Vec<&Value> = parts.iter().collect();
+    let h = graph.concatenate(&parts);
     let beta = graph.matrix(&model.beta().mapv(A::as_f64));
     let intercept = graph.row(&wide(model.intercept()));
     let mut y = graph.node("MatMul", &[&h, &beta]);
@@ -137,7 +141,7 @@ fn scores<A: Scalar, D: TargetDim>(graph: &mut Graph, model: &Elm<A, D>) -> Resu
     Ok(y)
 }
 
-fn hold(graph: &mut Graph, x: String, lower: &[f64], upper: &[f64]) -> String {
+fn hold(graph: &mut Graph, x: Value, lower: &[f64], upper: &[f64]) -> Value {
     let (lower, upper) = (graph.row(lower), graph.row(upper));
     let x = graph.node("Max", &[&x, &lower]);
     graph.node("Min", &[&x, &upper])
@@ -146,11 +150,11 @@ fn hold(graph: &mut Graph, x: String, lower: &[f64], upper: &[f64]) -> String {
 /// What the function of a group is applied to.
 fn arguments<A: Scalar>(
     graph: &mut Graph,
-    x: &str,
+    x: &Value,
     group: &NeuronBlock<A>,
     weights: &Array2<f64>,
     biases: &[f64],
-) -> String {
+) -> Value {
     let Some(scales) = group.input_scales() else {
         let (weights, biases) = (graph.matrix(weights), graph.row(biases));
         let z = graph.node("MatMul", &[x, &weights]);
@@ -169,7 +173,7 @@ fn arguments<A: Scalar>(
     graph.node("Sqrt", &[&sum])
 }
 
-fn activate<A: Scalar>(graph: &mut Graph, f: &Activation<A>, z: String) -> Result<String> {
+fn activate<A: Scalar>(graph: &mut Graph, f: &Activation<A>, z: Value) -> Result<Value> {
     Ok(match f {
         Activation::Sigmoid => graph.node("Sigmoid", &[&z]),
         Activation::Tanh => graph.node("Tanh", &[&z]),
@@ -187,7 +191,7 @@ fn activate<A: Scalar>(graph: &mut Graph, f: &Activation<A>, z: String) -> Resul
         Activation::HardLimit => {
             let zero = graph.row(&[0.0]);
             let at_least = graph.node("GreaterOrEqual", &[&z, &zero]);
-            graph.cast_to_double(&at_least)
+            graph.cast(&at_least, Precision::Double)
         }
         Activation::Isru => {
             let one = graph.row(&[1.0]);

@@ -9,7 +9,9 @@ use super::common::{one_of, usage};
 use super::samples::Reading;
 use super::{Failure, overwrite, say};
 use crate::error::Error;
-use crate::export::{ExportError, Format, Language, bsdf, header, merl_table, plugin, source};
+use crate::export::{
+    ExportError, Format, Language, OnnxPrecision, bsdf, header, merl_table, onnx, plugin, source,
+};
 use crate::file;
 use crate::model::BrdfModel;
 use crate::recipes;
@@ -26,6 +28,9 @@ use crate::scene_materials::measured_table;
 /// spectral variants. pbrt-v4's material 'measured' takes spectra. A .py file is a plug-in of Mitsuba's with
 /// the network inside, for all variants.
 ///
+/// An .onnx file is a graph with inputs 'light' and 'viewer' and the output 'values', BRDF in 1/sr of each
+/// channel, computed in double precision.
+///
 /// A MERL .binary file knows no difference between light and viewer: of a model that tells them apart it
 /// holds the mean.
 #[derive(Debug, Args)]
@@ -33,7 +38,7 @@ pub(super) struct Arguments {
     /// A saved model; or whatever 'fit' takes, to which a network is fitted now: a file (.csv or another
     /// table, MERL .binary, RGL .bsdf, pbrt-v2 .brdf), - for standard input, or 'curet:NAME'.
     model: String,
-    /// The file: .glsl, .wgsl, .hlsl, .c, .h (guarded, functions static), .bsdf, .py or .binary,
+    /// The file: .glsl, .wgsl, .hlsl, .c, .h (guarded, functions static), .bsdf, .py, .onnx or .binary,
     /// unless --format says what it is.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -54,6 +59,9 @@ pub(super) struct Arguments {
     /// (log-cosine, over all directions) if not given.
     #[arg(long, value_name = "N")]
     resolution: Option<usize>,
+    /// Inputs and outputs of an .onnx file as f64, in place of f32.
+    #[arg(long)]
+    double: bool,
     #[command(flatten)]
     reading: Reading,
 }
@@ -65,6 +73,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     if format != Format::Bsdf && (arguments.spectral || arguments.resolution.is_some()) {
         return Err(usage("--spectral and --resolution are for .bsdf files"));
+    }
+    if format != Format::Onnx && arguments.double {
+        return Err(usage("--double is for .onnx files"));
     }
     let reading = &arguments.reading;
     let inputs = match arguments.model.strip_prefix("csv:") {
@@ -81,6 +92,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
             let module = arguments.output.file_stem().unwrap_or_default();
             let text = plugin(network, &module.to_string_lossy(), &arguments.name)?;
             file::replace(&arguments.output, text.as_bytes())?;
+        }
+        Format::Onnx => {
+            let network = BrdfModel::of(brdf).ok_or(Error::Export(ExportError::NoNetwork))?;
+            let precision = match arguments.double {
+                true => OnnxPrecision::Double,
+                false => OnnxPrecision::Single,
+            };
+            file::replace(&arguments.output, &onnx(network, precision)?)?;
         }
         Format::Merl => {
             let (table, apart) = merl_table(brdf)?;
@@ -125,7 +144,7 @@ impl Arguments {
 
     /// Whether a spectrum stays one, or becomes its color.
     fn keeps_spectra(&self, format: Format) -> bool {
-        format == Format::Mitsuba || format == Format::Bsdf && self.spectral
+        matches!(format, Format::Mitsuba | Format::Onnx) || format == Format::Bsdf && self.spectral
     }
 
     /// What is exported as `format`.

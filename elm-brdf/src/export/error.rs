@@ -42,7 +42,7 @@ pub enum ExportError {
     },
     /// The file's extension says nothing of how to write it.
     #[error(
-        "cannot tell the format of {} (expected .glsl, .wgsl, .hlsl, .c, .binary, .bsdf or .py, or a format)",
+        "cannot tell the format of {} (expected .glsl, .wgsl, .hlsl, .c, .binary, .bsdf, .py or .onnx, or a format)",
         path.display()
     )]
     Format {

@@ -1,5 +1,5 @@
-//! Models for other programs: shader and C source with the network inside, plug-ins of Mitsuba 3, and tables
-//! of the MERL and RGL databases.
+//! Models for other programs: shader and C source with the network inside, plug-ins of Mitsuba 3, ONNX
+//! graphs, and tables of the MERL and RGL databases.
 //!
 //! [`source`] writes one self-contained function that takes two directions in the surface's frame
 //! (unit vectors, the normal along $+z$, towards the light and towards the viewer) and returns the
@@ -12,7 +12,8 @@
 //! renderer samples by.
 //!
 //! [`merl`] tabulates any model in the format of the MERL database, [`bsdf()`] as the tensor file that
-//! Mitsuba 3 and pbrt-v4 render; [`plugin`] writes a network as a plug-in of Mitsuba 3.
+//! Mitsuba 3 and pbrt-v4 render; [`plugin`] writes a network as a plug-in of Mitsuba 3, [`onnx()`] as a
+//! graph.
 //!
 //! ```
 //! use elm::{Activation, ElmParams, solve::Ridge};
@@ -37,9 +38,11 @@ mod activations;
 mod bsdf;
 mod dialect;
 pub(crate) mod error;
+mod expression;
 mod inputs;
 mod mitsuba;
 mod network;
+mod onnx;
 mod preamble;
 mod precision;
 mod sampler;
@@ -54,8 +57,10 @@ use elm_datasets::merl::Merl;
 
 pub use bsdf::bsdf;
 pub use dialect::Language;
+pub use elm::onnx::Precision as OnnxPrecision;
 pub use error::ExportError;
 pub use mitsuba::plugin;
+pub use onnx::onnx;
 pub use precision::{SinglePrecision, check_precision};
 pub use spectrum::PRIMARIES;
 pub use write::{header, source};
@@ -83,11 +88,13 @@ pub enum Format {
     Bsdf,
     /// A plug-in of Mitsuba 3, in Python.
     Mitsuba,
+    /// An ONNX graph.
+    Onnx,
 }
 
 impl Format {
     /// Every format there is.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Source(Language::Glsl),
         Self::Source(Language::Wgsl),
         Self::Source(Language::Hlsl),
@@ -95,6 +102,7 @@ impl Format {
         Self::Merl,
         Self::Bsdf,
         Self::Mitsuba,
+        Self::Onnx,
     ];
 
     /// The format's name.
@@ -105,6 +113,7 @@ impl Format {
             Self::Merl => "merl",
             Self::Bsdf => "bsdf",
             Self::Mitsuba => "mitsuba",
+            Self::Onnx => "onnx",
         }
     }
 

@@ -206,7 +206,8 @@ class ElmBase(BaseEstimator):
     def feature_importances_(self):
         """Scales of the inputs, ramps along them included, that ``n_neurons="auto"`` chose, 1 in sum.
 
-        For a model of given settings take :func:`sklearn.inspection.permutation_importance`.
+        For a model of given settings take ``permutation_importance`` of :class:`ElmRegressor` or of
+        :mod:`sklearn.inspection`.
 
         Returns
         -------
@@ -216,7 +217,7 @@ class ElmBase(BaseEstimator):
         if self._importances is None:
             raise AttributeError(
                 "feature_importances_ are known where n_neurons='auto' has chosen scales of inputs; "
-                "take sklearn.inspection.permutation_importance"
+                "take permutation_importance"
             )
         return self._importances
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from numbers import Integral
+
 import numpy as np
 from sklearn.base import RegressorMixin
+from sklearn.utils import Bunch, check_random_state
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ._base import FLOATS, ElmBase, interruptible
@@ -244,6 +247,50 @@ class ElmRegressor(RegressorMixin, ElmBase):
         X = self._inputs(X)
         deviation = self._uncertain().predict_deviation(X)
         return deviation[:, 0] if self._single else deviation
+
+    def permutation_importance(self, X, y, sample_weight=None, n_repeats=5):
+        """By how much the leave-one-out R2 falls where an input has the values of other rows.
+
+        Unlike :func:`sklearn.inspection.permutation_importance` it needs no rows that were set aside: each row
+        is predicted by the fit without it, exactly and without fitting again. Of inputs that say the same
+        neither is important, as the other is still there.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            The inputs that were fitted to.
+        y : array-like of shape (n_samples,) or (n_samples, n_outputs)
+            Their targets.
+        sample_weight : array-like of shape (n_samples,), default=None
+            Their weights.
+        n_repeats : int, default=5
+            Permutations of each input, seeded by `random_state`.
+
+        Returns
+        -------
+        result : :class:`sklearn.utils.Bunch`
+            ``importances`` of shape (n_features, n_repeats), the mean over outputs, and its
+            ``importances_mean`` and ``importances_std`` of shape (n_features,), as scikit-learn's has them.
+        """
+        check_is_fitted(self)
+        network = self._fitted()
+        X, y = validate_data(
+            self, X, y, reset=False, dtype=network.dtype, multi_output=True, y_numeric=True
+        )
+        if not isinstance(n_repeats, Integral) or isinstance(n_repeats, bool) or n_repeats < 1:
+            raise ValueError(f"n_repeats must be at least 1, got {n_repeats!r}")
+        y = np.asarray(y, dtype=X.dtype)
+        targets = y[:, None] if y.ndim == 1 else y
+        weights = self._weights(X, sample_weight)
+        seed = check_random_state(self.random_state).randint(2**31)
+        work = self._work(X) * X.shape[1] * n_repeats
+        arguments = (self._settings(), X, targets, weights, int(n_repeats), seed)
+        falls = interruptible(work, network.permutation_importance, *arguments)
+        return Bunch(
+            importances=falls,
+            importances_mean=falls.mean(axis=1),
+            importances_std=falls.std(axis=1),
+        )
 
     def _uncertain(self):
         check_is_fitted(self)

@@ -97,6 +97,21 @@ class Brdf:
         """Write a file that ``elm-brdf`` and :func:`load` read; JSON where the name ends in ``.json``."""
         self._model.save(path)
 
+    def to_onnx(self, path, double=False):
+        """Write the model as an ONNX graph.
+
+        Parameters
+        ----------
+        path : path-like
+            The file. Inputs are ``light`` and ``viewer`` of shape (rows, 3), made unit vectors; the output is
+            ``values`` of shape (rows, channels).
+        double : bool, default=False
+            Whether inputs and outputs are float64, else float32. All between is float64.
+        """
+        graph = self._model.to_onnx(double)
+        with open(path, "wb") as file:
+            file.write(graph)
+
     @property
     def channels(self):
         """Names of the channels."""
