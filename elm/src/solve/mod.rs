@@ -39,6 +39,7 @@ pub(crate) mod normal_equations;
 pub(crate) mod norms;
 mod pseudo_inverse;
 pub(crate) mod ridge;
+mod stack;
 pub(crate) mod symmetric;
 #[cfg(test)]
 mod tests_tiles;

@@ -10,7 +10,7 @@ use super::equilibration::EquilibratedProblem;
 use super::lambda_grid::{FIRST_STEP, distinguishable_lambdas, grid, strength};
 use super::leave_one_out::{self, NEGLIGIBLE};
 use super::normal_equations::RowSource;
-use super::tiles::{self, Tiles};
+use super::tiles::{Shape, Tiles};
 use super::{LeastSquares, Reason, Solution, gram};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
@@ -177,8 +177,9 @@ impl Ridge {
     }
 
     /// The answer from rows that need not stand in memory together: where a given strength allows
-    /// the normal equations and there are at least as many rows as neurons, and wherever there are
-    /// many more rows than neurons.
+    /// the normal equations and there are at least as many rows as neurons; where there are many more
+    /// rows than neurons; and for a search with at least four rows to a neuron where the condition
+    /// allows sums of products.
     pub(super) fn solve_rows<A: Scalar>(
         self,
         source: &RowSource<'_, A>,
@@ -189,60 +190,66 @@ impl Ridge {
         {
             return Ok(Some(solution));
         }
-        if !tiles::worthwhile(source.rows(), source.neurons()) {
-            return Ok(None);
-        }
-        let Some(mut tiles) = Tiles::new(source)? else {
-            return Ok(None);
-        };
+        let is = |shape: Shape| shape.has(source.rows(), source.neurons());
         match self.lambda {
-            Lambda::Relative(_) => {
+            Lambda::Relative(_) if is(Shape::TRIANGLE) => {
+                let Some(mut tiles) = Tiles::new(source, Shape::TRIANGLE)? else {
+                    return Ok(None);
+                };
                 let Some((triangle, frame)) = tiles.centered_triangle()? else {
                     return Ok(None);
                 };
                 let spectrum = DesignSvd::<A>::of_triangle(triangle.narrow(), frame.narrow())?;
                 Ok(Some(self.solve_spectrum(&spectrum)))
             }
-            Lambda::Gcv | Lambda::LeaveOneOut => {
-                let solution = self.search_tiles(&mut tiles, unit_roundoff::<A>())?;
-                Ok(solution.map(Solution::narrow))
+            Lambda::Gcv | Lambda::LeaveOneOut if is(Shape::PRODUCTS) => {
+                let Some(mut tiles) = Tiles::new(source, Shape::PRODUCTS)? else {
+                    return Ok(None);
+                };
+                let spectrum = if is(Shape::TRIANGLE) {
+                    tiles.spectrum()?
+                } else if tiles.frame.weights_differ() {
+                    // They may be numbers of rows, of which one is to be left out.
+                    None
+                } else {
+                    tiles.spectrum_of_products()?
+                };
+                let Some(spectrum) = spectrum else {
+                    return Ok(None);
+                };
+                let solution = self.search_tiles(&mut tiles, &spectrum, unit_roundoff::<A>())?;
+                Ok(Some(solution.narrow()))
             }
+            _ => Ok(None),
         }
     }
 
-    /// As [`search`](Self::search), for many rows; nothing where their numbers are out of range.
+    /// As [`search`](Self::search), for many rows of this spectrum.
     pub(super) fn search_tiles<A: Scalar>(
         self,
         tiles: &mut Tiles<'_, '_, A>,
+        spectrum: &DesignSvd<f64>,
         roundoff: f64,
-    ) -> Result<Option<Solution<f64>>> {
-        let Some(spectrum) = tiles.spectrum()? else {
-            return Ok(None);
-        };
+    ) -> Result<Solution<f64>> {
         let reason = Reason::LambdaSearch;
         if self.lambda == Lambda::Gcv {
-            let lambda = self.by_gcv(&spectrum, roundoff);
-            return Ok(Some(ridge_solution(&spectrum, reason, &lambda, None)));
+            let lambda = self.by_gcv(spectrum, roundoff);
+            return Ok(ridge_solution(spectrum, reason, &lambda, None));
         }
-        let candidates = distinguishable_lambdas(&spectrum);
+        let candidates = distinguishable_lambdas(spectrum);
         let (candidates, scores) = if spectrum.frame.weights_differ() {
-            let mut lambda = self.by_gcv(&spectrum, roundoff);
+            let mut lambda = self.by_gcv(spectrum, roundoff);
             lambda.sort_by(f64::total_cmp);
             lambda.dedup();
-            let scores = leave_one_out::scores_of_tiles(tiles, &spectrum, &lambda, roundoff)?;
+            let scores = leave_one_out::scores_of_tiles(tiles, spectrum, &lambda, roundoff)?;
             (lambda, scores)
         } else {
-            let scores = self.worthwhile_scores(tiles, &spectrum, &candidates, roundoff)?;
+            let scores = self.worthwhile_scores(tiles, spectrum, &candidates, roundoff)?;
             (candidates, scores)
         };
         let (lambda, errors) =
-            self.lambda_and_errors(&spectrum, &candidates, &scores, (roundoff, true));
-        Ok(Some(ridge_solution(
-            &spectrum,
-            reason,
-            &lambda,
-            Some(errors),
-        )))
+            self.lambda_and_errors(spectrum, &candidates, &scores, (roundoff, true));
+        Ok(ridge_solution(spectrum, reason, &lambda, Some(errors)))
     }
 
     /// The answer by the best strength for predictions in arithmetic of this unit roundoff.

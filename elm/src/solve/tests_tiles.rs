@@ -11,7 +11,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::normal_equations::{HiddenRows, RowSource};
-use super::tiles::Tiles;
+use super::tiles::{Shape, Tiles};
 use super::{LeastSquares, PseudoInverse, Ridge, Route, Solution};
 use crate::scalar::Scalar;
 
@@ -72,9 +72,10 @@ impl<A: Scalar> Problem<A> {
 
     fn by_tiles(&self, ridge: Ridge) -> Solution<f64> {
         let source = self.source();
-        let mut tiles = Tiles::new(&source).unwrap().unwrap();
+        let mut tiles = Tiles::new(&source, Shape::PRODUCTS).unwrap().unwrap();
+        let spectrum = tiles.spectrum().unwrap().unwrap();
         let roundoff = A::epsilon().as_f64() / 2.0;
-        ridge.search_tiles(&mut tiles, roundoff).unwrap().unwrap()
+        ridge.search_tiles(&mut tiles, &spectrum, roundoff).unwrap()
     }
 
     fn by_matrix(&self, ridge: Ridge) -> Solution<f64> {
@@ -309,7 +310,7 @@ fn the_triangle_serves_the_pseudo_inverse_and_weak_strengths() {
         let whole = LeastSquares::new(&problem.hidden, &problem.targets).unwrap();
         let whole = whole.with_intercept(true);
         let source = problem.source();
-        let mut tiles = Tiles::new(&source).unwrap().unwrap();
+        let mut tiles = Tiles::new(&source, Shape::TRIANGLE).unwrap().unwrap();
         let (triangle, frame) = tiles.centered_triangle().unwrap().unwrap();
         let solver = PseudoInverse::default();
         let tiles = solver.solve_centered(triangle, frame).unwrap();
@@ -320,4 +321,23 @@ fn the_triangle_serves_the_pseudo_inverse_and_weak_strengths() {
         let bound = bound(Route::Qr, condition, problem.hidden.dim());
         assert!(problem.apart(&tiles, &matrix) <= bound);
     }
+}
+
+#[test]
+fn sums_of_products_serve_few_rows_where_their_condition_allows_it() {
+    let taken = |problem: &Problem<f64>| {
+        let solution = Ridge::default().solve_rows(&problem.source()).unwrap();
+        solution.map(|solution| solution.diagnosis.route)
+    };
+    let mut problem = Problem::new(normal(900, 150, 17), 2, 0.3);
+    assert_eq!(problem.agrees("six rows per column"), Route::GramSvd);
+    assert_eq!(taken(&problem), Some(Route::GramSvd));
+    let few = Problem::new(normal(590, 150, 18), 2, 0.3);
+    assert_eq!(taken(&few), None);
+    assert_eq!(taken(&Problem::new(graded(900, 150, 1e6), 2, 0.3)), None);
+    // They may be numbers of rows, of which one is left out.
+    problem.weights = Some(Array1::from_shape_fn(900, |row| 1.0 + (row % 3) as f64));
+    assert_eq!(taken(&problem), None);
+    problem.weights = Some(Array1::from_elem(900, 3.0));
+    assert_eq!(taken(&problem), Some(Route::GramSvd));
 }

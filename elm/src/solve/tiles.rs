@@ -13,25 +13,55 @@ use super::design_svd::DesignSvd;
 use super::equilibration::{Equilibration, magnitudes};
 use super::gram;
 use super::normal_equations::{NormalEquations, RowSource, center_of, runs, spread_runs};
+use super::stack::Stack;
 use crate::error::Result;
 use crate::feature_map::TileBuffers;
 use crate::linalg::{Backend, Eigen, QrFactor};
 use crate::scalar::{Scalar, power_of_two};
 use crate::threads;
 
-/// Rows for each column below which a problem is answered from its matrix, which costs no second
-/// look at the rows, and is factorized as accurately as it can be.
-const ROWS_PER_COLUMN: usize = 16;
-/// Entries of a hidden-layer matrix that is small enough to be there.
-const SMALL: usize = 1 << 20;
-
-/// Whether a problem of this shape is answered a tile at a time.
-pub(super) fn worthwhile(rows: usize, columns: usize) -> bool {
-    rows.saturating_mul(columns) >= SMALL && has_many_rows(rows, columns)
+/// Numbers of rows and columns from which a problem is answered a tile at a time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shape {
+    /// Rows for each column.
+    rows_per_column: usize,
+    /// Entries of the hidden-layer matrix.
+    entries: usize,
 }
 
-fn has_many_rows(rows: usize, columns: usize) -> bool {
-    rows / ROWS_PER_COLUMN >= columns
+impl Shape {
+    /// Below these a matrix is factorized as accurately as it can be, which costs no second look at the
+    /// rows.
+    pub(super) const TRIANGLE: Self = Self {
+        rows_per_column: 16,
+        entries: 1 << 20,
+    };
+    /// From these on sums of products, where their condition allows them, take less time than a
+    /// factorization of the matrix.
+    pub(super) const PRODUCTS: Self = Self {
+        rows_per_column: 4,
+        entries: 1 << 17,
+    };
+
+    /// Whether a problem of so many rows and columns is one.
+    pub(super) fn has(self, rows: usize, columns: usize) -> bool {
+        rows.saturating_mul(columns) >= self.entries && self.has_rows(rows, columns)
+    }
+
+    fn has_rows(self, rows: usize, columns: usize) -> bool {
+        rows / self.rows_per_column >= columns
+    }
+}
+
+/// Whether the condition of these sums of products may be one that they are good for: pivots bound the
+/// smallest singular value from above, columns the largest from below.
+fn may_be_conditioned(products: Array2<f64>) -> bool {
+    let largest = products.diag().fold(0.0, |m: f64, v| m.max(*v));
+    // Without a factor the condition is far beyond what is asked for.
+    f64::cholesky(products).is_ok_and(|factor| {
+        let smallest = factor.diag().fold(f64::INFINITY, |m: f64, v| m.min(*v));
+        gram::allowed::<f64>(smallest * smallest / largest)
+    })
 }
 
 /// Rows of a sample, in units of the columns: enough to see what the condition is about.
@@ -66,12 +96,12 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     ///
     /// # Errors
     /// Those of making the rows.
-    pub(super) fn new(source: &'s RowSource<'a, A>) -> Result<Option<Self>> {
+    pub(super) fn new(source: &'s RowSource<'a, A>, shape: Shape) -> Result<Option<Self>> {
         let weights = source.weights.map(A::widen);
         let weights = weights.as_ref().map(|weights| weights.view());
         let mut frame =
             Equilibration::of_weights(source.rows(), weights.as_ref(), source.intercept);
-        if !has_many_rows(frame.weighted_rows, source.neurons()) {
+        if !shape.has_rows(frame.weighted_rows, source.neurons()) {
             return Ok(None);
         }
         frame.hidden_scale = source.hidden.scale_wide(&frame.root_weights);
@@ -184,13 +214,20 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         Ok(wide.slice(s![..rows.len(), ..]))
     }
 
-    /// Looks at rows from everywhere: sets the shift, and says whether the sums of products may do.
+    /// Looks at rows from everywhere: sets the shift, and says whether the sums of products may do. Where
+    /// that would take a quarter of the rows, the sums themselves will tell.
     ///
     /// # Errors
     /// Those of making the rows.
     fn look(&mut self) -> Result<bool> {
         let width = self.source.width();
-        let wanted = (SAMPLE * width).max(MIN_SAMPLE).min(self.rows());
+        let wanted = (SAMPLE * width).max(MIN_SAMPLE);
+        let is_whole = wanted > self.rows() / 4;
+        let wanted = if is_whole {
+            MIN_SAMPLE.min(self.rows())
+        } else {
+            wanted
+        };
         let mut sample = Vec::with_capacity(wanted * width);
         let mut roots = Vec::with_capacity(wanted);
         let zeros = vec![0.0; self.shift.len()];
@@ -212,18 +249,14 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         let Ok(sample) = ArrayView2::from_shape((sample.len() / width, width), &sample) else {
             return Ok(false);
         };
-        if sample.nrows() < neurons || !sample.iter().all(|value| value.is_finite()) {
+        if !sample.iter().all(|value| value.is_finite()) {
             return Ok(false);
         }
+        if is_whole {
+            return Ok(true);
+        }
         let products = f64::gram(sample.slice(s![.., ..neurons]));
-        let largest = products.diag().fold(0.0, |m: f64, v| m.max(*v));
-        // Without a factor the condition is far beyond what is asked for.
-        let Ok(factor) = f64::cholesky(products) else {
-            return Ok(false);
-        };
-        // Pivots bound the smallest singular value from above, columns the largest from below.
-        let smallest = factor.diag().fold(f64::INFINITY, |m: f64, v| m.min(*v));
-        Ok(gram::allowed::<f64>(smallest * smallest / largest))
+        Ok(sample.nrows() >= neurons && may_be_conditioned(products))
     }
 
     /// The problem in the coordinates of its singular vectors, or nothing where the numbers are out
@@ -232,9 +265,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     /// # Errors
     /// Those of making the rows and of the factorizations.
     pub(super) fn spectrum(&mut self) -> Result<Option<DesignSvd<f64>>> {
-        if self.look()?
-            && let Some(spectrum) = self.spectrum_of_products()?
-        {
+        if let Some(spectrum) = self.spectrum_of_products()? {
             return Ok(Some(spectrum));
         }
         let Some((triangle, frame)) = self.triangle()? else {
@@ -255,18 +286,25 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         self.triangle()
     }
 
-    /// By the singular values of the sums of products, where those are well enough conditioned and
-    /// the targets not explained down to where sums of squares have no digits.
-    fn spectrum_of_products(&self) -> Result<Option<DesignSvd<f64>>> {
+    /// As [`spectrum`](Self::spectrum), by the singular values of the sums of products, where those are well
+    /// enough conditioned and the targets not explained down to where sums of squares have no digits.
+    ///
+    /// # Errors
+    /// Those of making the rows and of the factorization.
+    pub(super) fn spectrum_of_products(&mut self) -> Result<Option<DesignSvd<f64>>> {
         /// The least share of the targets' squares that must be left.
         const UNEXPLAINED: f64 = 1e-6;
+        if !self.look()? {
+            return Ok(None);
+        }
         let width = self.source.width();
+        let rows = &*self;
         let sums_of = |part: Range<usize>| {
             let mut sums = Array2::zeros((width, width).f());
-            let (mut memory, mut scratch) = (self.memory(), Vec::new());
-            for range in self.ranges(part) {
-                if !self.is_empty(range.clone()) {
-                    let tile = self.tile(range, &self.shift, &mut memory)?;
+            let (mut memory, mut scratch) = (rows.memory(), Vec::new());
+            for range in rows.ranges(part) {
+                if !rows.is_empty(range.clone()) {
+                    let tile = rows.tile(range, &rows.shift, &mut memory)?;
                     f64::add_gram(tile, &mut sums, &mut scratch);
                 }
             }
@@ -279,6 +317,9 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
             return Ok(None);
         }
         let gram = &moments.gram;
+        if !may_be_conditioned(gram.clone()) {
+            return Ok(None);
+        }
         let Eigen { values: s, vt } = f64::eigen(gram.view())?;
         let (Some(&largest), Some(&smallest)) = (s.first(), s.last()) else {
             return Ok(None);
@@ -419,82 +460,6 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
             residual_ss,
         };
         (in_range && finite).then_some((triangle, frame))
-    }
-}
-
-/// A triangle on top of rows that are to enter it.
-struct Stack {
-    hidden: Array2<f64>,
-    targets: Array2<f64>,
-    residual_ss: Array1<f64>,
-    filled: usize,
-}
-
-impl Stack {
-    fn new(columns: usize, outputs: usize, block: usize) -> Self {
-        Self {
-            hidden: Array2::zeros((columns + block, columns).f()),
-            targets: Array2::zeros((columns + block, outputs).f()),
-            residual_ss: Array1::zeros(outputs),
-            filled: columns,
-        }
-    }
-
-    /// Rows of a block.
-    fn room(&self) -> usize {
-        self.hidden.nrows() - self.hidden.ncols()
-    }
-
-    fn push(
-        &mut self,
-        ones: ArrayView2<'_, f64>,
-        hidden: ArrayView2<'_, f64>,
-        targets: ArrayView2<'_, f64>,
-    ) -> Result<()> {
-        let mut first = 0;
-        while first < hidden.nrows() {
-            let room = self.hidden.nrows() - self.filled;
-            let from = first..hidden.nrows().min(first + room);
-            let to = self.filled..self.filled + from.len();
-            let mut rows = self.hidden.slice_mut(s![to.clone(), ..]);
-            rows.slice_mut(s![.., ..ones.ncols()])
-                .assign(&ones.slice(s![from.clone(), ..]));
-            rows.slice_mut(s![.., ones.ncols()..])
-                .assign(&hidden.slice(s![from.clone(), ..]));
-            self.targets
-                .slice_mut(s![to.clone(), ..])
-                .assign(&targets.slice(s![from.clone(), ..]));
-            (first, self.filled) = (from.end, to.end);
-            if self.filled == self.hidden.nrows() {
-                self.factorize()?;
-            }
-        }
-        Ok(())
-    }
-
-    fn factorize(&mut self) -> Result<()> {
-        let rows = s![..self.filled, ..];
-        let QrFactor {
-            r,
-            qtb,
-            residual_ss,
-        } = f64::triangularize(self.hidden.slice(rows), self.targets.slice(rows))?;
-        self.filled = r.nrows();
-        let top = s![..self.filled, ..];
-        self.hidden.slice_mut(top).assign(&r);
-        self.targets.slice_mut(top).assign(&qtb);
-        self.residual_ss += &residual_ss;
-        Ok(())
-    }
-
-    fn finish(mut self) -> Result<QrFactor<f64>> {
-        self.factorize()?;
-        let top = s![..self.filled, ..];
-        Ok(QrFactor {
-            r: self.hidden.slice(top).to_owned(),
-            qtb: self.targets.slice(top).to_owned(),
-            residual_ss: self.residual_ss,
-        })
     }
 }
 

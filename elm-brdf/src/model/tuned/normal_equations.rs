@@ -28,6 +28,39 @@ pub(super) struct NormalEquations {
     cross: Array2<f64>,
 }
 
+/// Columns up to which a product is made row by row: its time is that of reading the rows, which a general
+/// product copies first.
+const THIN: usize = 8;
+
+/// $A B$ for a $B$ of few columns.
+fn thin_product(a: ArrayView2<'_, f64>, b: &Array2<f64>) -> Array2<f64> {
+    if b.ncols() > THIN {
+        return a.dot(b);
+    }
+    let columns = b.t().as_standard_layout().into_owned();
+    let mut product = Array2::zeros((a.nrows(), b.ncols()));
+    for (mut to, row) in product.rows_mut().into_iter().zip(a.rows()) {
+        for (to, column) in to.iter_mut().zip(columns.rows()) {
+            *to = row.dot(&column);
+        }
+    }
+    product
+}
+
+/// $A^T B$ for a $B$ of few columns.
+fn thin_transposed_product(a: ArrayView2<'_, f64>, b: ArrayView2<'_, f64>) -> Array2<f64> {
+    if b.ncols() > THIN {
+        return a.t().dot(&b);
+    }
+    let mut product = Array2::zeros((b.ncols(), a.ncols()));
+    for (row, factors) in a.rows().into_iter().zip(b.rows()) {
+        for (mut to, &factor) in product.rows_mut().into_iter().zip(factors) {
+            to.scaled_add(factor, &row);
+        }
+    }
+    product.reversed_axes()
+}
+
 /// Output weights, and what they leave.
 #[derive(Debug, Clone)]
 pub(super) struct Weights {
@@ -38,7 +71,7 @@ pub(super) struct Weights {
 
 impl Weights {
     pub(super) fn apply(&self, h: ArrayView2<'_, f64>) -> Array2<f64> {
-        h.dot(&self.beta) + &self.intercept
+        thin_product(h, &self.beta) + &self.intercept
     }
 }
 
@@ -55,10 +88,10 @@ impl NormalEquations {
             .slice_axis_mut(Axis(1), Slice::from(..neurons))
             .assign(&h);
         let weighted = weights.map(|weights| &bordered * &weights.view().insert_axis(Axis(1)));
-        let left = weighted.as_ref().unwrap_or(&bordered).t();
+        let left = weighted.as_ref().unwrap_or(&bordered);
         Self {
-            gram: lower_product(left, bordered.view()),
-            cross: left.dot(&t),
+            gram: lower_product(left.t(), bordered.view()),
+            cross: thin_transposed_product(left.view(), t),
         }
     }
 
@@ -73,7 +106,7 @@ impl NormalEquations {
         let weighted = weighted.as_ref().unwrap_or(t);
         let mut cross = Array2::zeros((h.ncols() + 1, t.ncols()));
         let mut hidden = cross.slice_axis_mut(Axis(0), Slice::from(..h.ncols()));
-        hidden.assign(&h.t().dot(weighted));
+        hidden.assign(&thin_transposed_product(h.view(), weighted.view()));
         cross.row_mut(h.ncols()).assign(&weighted.sum_axis(Axis(0)));
         Self {
             gram: self.gram.clone(),
