@@ -39,6 +39,9 @@ impl Brdf {
     }
 }
 
+/// Directions, and their densities in 1/sr.
+type Drawn<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
+
 fn is_above(w: Vector) -> bool {
     w[2] > 0.0
 }
@@ -117,7 +120,7 @@ impl Brdf {
         py: Python<'py>,
         wo: PyReadonlyArray2<'_, f64>,
         u: PyReadonlyArray2<'_, f64>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)> {
+    ) -> PyResult<Drawn<'py>> {
         let (wo, u) = (wo.as_array(), u.as_array());
         if wo.ncols() != 3 || u.dim() != (wo.nrows(), 2) {
             return Err(PyValueError::new_err(format!(

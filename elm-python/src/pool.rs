@@ -10,8 +10,9 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use crate::settings::error;
 
 /// By process, as threads do not outlive a fork, and number of threads.
-static POOLS: LazyLock<Mutex<HashMap<(u32, usize), Arc<ThreadPool>>>> =
-    LazyLock::new(Mutex::default);
+static POOLS: LazyLock<Mutex<Pools>> = LazyLock::new(Mutex::default);
+
+type Pools = HashMap<(u32, usize), Arc<ThreadPool>>;
 
 /// What `work` gives on this number of threads, the interpreter's lock released meanwhile.
 ///
