@@ -85,21 +85,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     overwrite::refuse([arguments.output.as_path()], &inputs)?;
     let exported = arguments.material(format)?;
     let brdf = &*exported.brdf;
+    let network = || BrdfModel::of(brdf).ok_or(Error::Export(ExportError::NoNetwork));
     match format {
         Format::Bsdf => write_bsdf(arguments, exported)?,
         Format::Mitsuba => {
-            let network = BrdfModel::of(brdf).ok_or(Error::Export(ExportError::NoNetwork))?;
             let module = arguments.output.file_stem().unwrap_or_default();
-            let text = plugin(network, &module.to_string_lossy(), &arguments.name)?;
+            let text = plugin(network()?, &module.to_string_lossy(), &arguments.name)?;
             file::replace(&arguments.output, text.as_bytes())?;
         }
         Format::Onnx => {
-            let network = BrdfModel::of(brdf).ok_or(Error::Export(ExportError::NoNetwork))?;
             let precision = match arguments.double {
                 true => OnnxPrecision::Double,
                 false => OnnxPrecision::Single,
             };
-            file::replace(&arguments.output, &onnx(network, precision)?)?;
+            file::replace(&arguments.output, &onnx(network()?, precision)?)?;
         }
         Format::Merl => {
             let (table, apart) = merl_table(brdf)?;
@@ -113,8 +112,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
             }
         }
         Format::Source(language) => {
-            let network = BrdfModel::of(brdf).ok_or(Error::Export(ExportError::NoNetwork))?;
-            let mut text = source(network, language, &arguments.name)?;
+            let mut text = source(network()?, language, &arguments.name)?;
             if arguments.output.extension().is_some_and(|e| e == "h") && language == Language::C {
                 text = header(&text, &arguments.name);
             }

@@ -80,7 +80,7 @@ pub enum ExportError {
         channels: usize,
     },
     /// A model that is no network.
-    #[error("only a network can be exported as source")]
+    #[error("only a network can be exported in this form, and a table (--exact) is none")]
     NoNetwork,
 }
 

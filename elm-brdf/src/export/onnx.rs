@@ -134,7 +134,11 @@ impl Values<'_> {
                 match (function, values.as_slice()) {
                     (Function::Angle, [y, x]) => angle(self.graph, y, x),
                     (Function::Sqrt, [x]) => self.graph.node("Sqrt", &[x]),
-                    (_, values) => self.graph.node("Max", &values.iter().collect::<Vec<_>>()),
+                    (Function::Max, [a, b]) => self.graph.node("Max", &[a, b]),
+                    _ => {
+                        let name = format!("{function:?} of {} arguments", values.len());
+                        return Err(ExportError::Input { name });
+                    }
                 }
             }
         })

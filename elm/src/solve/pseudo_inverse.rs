@@ -10,7 +10,7 @@ use super::lanczos::largest_eigenvalue;
 use super::normal_equations::RowSource;
 use super::norms::{norm, rounding};
 use super::symmetric::Symmetric;
-use super::tiles::{Shape, Tiles};
+use super::tiles::{Threshold, Tiles};
 use super::{Diagnosis, LeastSquares, Reason, Route, Solution};
 use crate::error::{Error, Result};
 use crate::linalg::QrFactor;
@@ -104,10 +104,10 @@ impl PseudoInverse {
         self,
         source: &RowSource<'_, A>,
     ) -> Result<Option<Solution<A>>> {
-        if !Shape::TRIANGLE.has(source.rows(), source.neurons()) {
+        if !Threshold::TRIANGLE.is_met(source.rows(), source.neurons()) {
             return Ok(None);
         }
-        let Some(mut tiles) = Tiles::new(source, Shape::TRIANGLE)? else {
+        let Some(mut tiles) = Tiles::new(source, Threshold::TRIANGLE)? else {
             return Ok(None);
         };
         let Some((triangle, frame)) = tiles.centered_triangle()? else {

@@ -10,7 +10,7 @@ use super::equilibration::EquilibratedProblem;
 use super::lambda_grid::{FIRST_STEP, distinguishable_lambdas, grid, strength};
 use super::leave_one_out::{self, NEGLIGIBLE};
 use super::normal_equations::RowSource;
-use super::tiles::{Shape, Tiles};
+use super::tiles::{Threshold, Tiles};
 use super::{LeastSquares, Reason, Solution, gram};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
@@ -190,10 +190,10 @@ impl Ridge {
         {
             return Ok(Some(solution));
         }
-        let is = |shape: Shape| shape.has(source.rows(), source.neurons());
+        let is = |threshold: Threshold| threshold.is_met(source.rows(), source.neurons());
         match self.lambda {
-            Lambda::Relative(_) if is(Shape::TRIANGLE) => {
-                let Some(mut tiles) = Tiles::new(source, Shape::TRIANGLE)? else {
+            Lambda::Relative(_) if is(Threshold::TRIANGLE) => {
+                let Some(mut tiles) = Tiles::new(source, Threshold::TRIANGLE)? else {
                     return Ok(None);
                 };
                 let Some((triangle, frame)) = tiles.centered_triangle()? else {
@@ -202,11 +202,11 @@ impl Ridge {
                 let spectrum = DesignSvd::<A>::of_triangle(triangle.narrow(), frame.narrow())?;
                 Ok(Some(self.solve_spectrum(&spectrum)))
             }
-            Lambda::Gcv | Lambda::LeaveOneOut if is(Shape::PRODUCTS) => {
-                let Some(mut tiles) = Tiles::new(source, Shape::PRODUCTS)? else {
+            Lambda::Gcv | Lambda::LeaveOneOut if is(Threshold::PRODUCTS) => {
+                let Some(mut tiles) = Tiles::new(source, Threshold::PRODUCTS)? else {
                     return Ok(None);
                 };
-                let spectrum = if is(Shape::TRIANGLE) {
+                let spectrum = if is(Threshold::TRIANGLE) {
                     tiles.spectrum()?
                 } else if tiles.frame.weights_differ() {
                     // They may be numbers of rows, of which one is to be left out.

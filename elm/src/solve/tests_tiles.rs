@@ -11,7 +11,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::normal_equations::{HiddenRows, RowSource};
-use super::tiles::{Shape, Tiles};
+use super::tiles::{Threshold, Tiles};
 use super::{LeastSquares, PseudoInverse, Ridge, Route, Solution};
 use crate::scalar::Scalar;
 
@@ -72,7 +72,7 @@ impl<A: Scalar> Problem<A> {
 
     fn by_tiles(&self, ridge: Ridge) -> Solution<f64> {
         let source = self.source();
-        let mut tiles = Tiles::new(&source, Shape::PRODUCTS).unwrap().unwrap();
+        let mut tiles = Tiles::new(&source, Threshold::PRODUCTS).unwrap().unwrap();
         let spectrum = tiles.spectrum().unwrap().unwrap();
         let roundoff = A::epsilon().as_f64() / 2.0;
         ridge.search_tiles(&mut tiles, &spectrum, roundoff).unwrap()
@@ -310,7 +310,7 @@ fn the_triangle_serves_the_pseudo_inverse_and_weak_strengths() {
         let whole = LeastSquares::new(&problem.hidden, &problem.targets).unwrap();
         let whole = whole.with_intercept(true);
         let source = problem.source();
-        let mut tiles = Tiles::new(&source, Shape::TRIANGLE).unwrap().unwrap();
+        let mut tiles = Tiles::new(&source, Threshold::TRIANGLE).unwrap().unwrap();
         let (triangle, frame) = tiles.centered_triangle().unwrap().unwrap();
         let solver = PseudoInverse::default();
         let tiles = solver.solve_centered(triangle, frame).unwrap();

@@ -22,14 +22,14 @@ use crate::threads;
 
 /// Numbers of rows and columns from which a problem is answered a tile at a time.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Shape {
+pub(super) struct Threshold {
     /// Rows for each column.
     rows_per_column: usize,
     /// Entries of the hidden-layer matrix.
     entries: usize,
 }
 
-impl Shape {
+impl Threshold {
     /// Below these a matrix is factorized as accurately as it can be, which costs no second look at the
     /// rows.
     pub(super) const TRIANGLE: Self = Self {
@@ -43,8 +43,8 @@ impl Shape {
         entries: 1 << 17,
     };
 
-    /// Whether a problem of so many rows and columns is one.
-    pub(super) fn has(self, rows: usize, columns: usize) -> bool {
+    /// Whether a problem has so many rows and columns.
+    pub(super) fn is_met(self, rows: usize, columns: usize) -> bool {
         rows.saturating_mul(columns) >= self.entries && self.has_rows(rows, columns)
     }
 
@@ -96,12 +96,12 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     ///
     /// # Errors
     /// Those of making the rows.
-    pub(super) fn new(source: &'s RowSource<'a, A>, shape: Shape) -> Result<Option<Self>> {
+    pub(super) fn new(source: &'s RowSource<'a, A>, threshold: Threshold) -> Result<Option<Self>> {
         let weights = source.weights.map(A::widen);
         let weights = weights.as_ref().map(|weights| weights.view());
         let mut frame =
             Equilibration::of_weights(source.rows(), weights.as_ref(), source.intercept);
-        if !shape.has_rows(frame.weighted_rows, source.neurons()) {
+        if !threshold.has_rows(frame.weighted_rows, source.neurons()) {
             return Ok(None);
         }
         frame.hidden_scale = source.hidden.scale_wide(&frame.root_weights);
@@ -214,19 +214,19 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         Ok(wide.slice(s![..rows.len(), ..]))
     }
 
-    /// Looks at rows from everywhere: sets the shift, and says whether the sums of products may do. Where
-    /// that would take a quarter of the rows, the sums themselves will tell.
+    /// Looks at rows from everywhere: sets the shift, and says whether the sums of products may do; nothing
+    /// where that would take a quarter of the rows, and the sums themselves tell.
     ///
     /// # Errors
     /// Those of making the rows.
-    fn look(&mut self) -> Result<bool> {
+    fn look(&mut self) -> Result<Option<bool>> {
         let width = self.source.width();
         let wanted = (SAMPLE * width).max(MIN_SAMPLE);
-        let is_whole = wanted > self.rows() / 4;
-        let wanted = if is_whole {
-            MIN_SAMPLE.min(self.rows())
-        } else {
+        let is_sampled = wanted <= self.rows() / 4;
+        let wanted = if is_sampled {
             wanted
+        } else {
+            MIN_SAMPLE.min(self.rows())
         };
         let mut sample = Vec::with_capacity(wanted * width);
         let mut roots = Vec::with_capacity(wanted);
@@ -247,16 +247,16 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         }
         let neurons = self.neurons();
         let Ok(sample) = ArrayView2::from_shape((sample.len() / width, width), &sample) else {
-            return Ok(false);
+            return Ok(Some(false));
         };
         if !sample.iter().all(|value| value.is_finite()) {
-            return Ok(false);
+            return Ok(Some(false));
         }
-        if is_whole {
-            return Ok(true);
+        if !is_sampled {
+            return Ok(None);
         }
         let products = f64::gram(sample.slice(s![.., ..neurons]));
-        Ok(sample.nrows() >= neurons && may_be_conditioned(products))
+        Ok(Some(may_be_conditioned(products)))
     }
 
     /// The problem in the coordinates of its singular vectors, or nothing where the numbers are out
@@ -294,7 +294,8 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     pub(super) fn spectrum_of_products(&mut self) -> Result<Option<DesignSvd<f64>>> {
         /// The least share of the targets' squares that must be left.
         const UNEXPLAINED: f64 = 1e-6;
-        if !self.look()? {
+        let looked = self.look()?;
+        if looked == Some(false) {
             return Ok(None);
         }
         let width = self.source.width();
@@ -317,7 +318,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
             return Ok(None);
         }
         let gram = &moments.gram;
-        if !may_be_conditioned(gram.clone()) {
+        if looked.is_none() && !may_be_conditioned(gram.clone()) {
             return Ok(None);
         }
         let Eigen { values: s, vt } = f64::eigen(gram.view())?;
