@@ -178,7 +178,7 @@ impl Ridge {
 
     /// The answer from rows that need not stand in memory together: where a given strength allows
     /// the normal equations and there are at least as many rows as neurons; where there are many more
-    /// rows than neurons; and for a search with at least four rows to a neuron where the condition
+    /// rows than neurons; and for a search with at least eight rows to a neuron where the condition
     /// allows sums of products.
     pub(super) fn solve_rows<A: Scalar>(
         self,

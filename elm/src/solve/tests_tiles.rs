@@ -329,15 +329,15 @@ fn sums_of_products_serve_few_rows_where_their_condition_allows_it() {
         let solution = Ridge::default().solve_rows(&problem.source()).unwrap();
         solution.map(|solution| solution.diagnosis.route)
     };
-    let mut problem = Problem::new(normal(900, 150, 17), 2, 0.3);
-    assert_eq!(problem.agrees("six rows per column"), Route::GramSvd);
+    let mut problem = Problem::new(normal(1250, 150, 17), 2, 0.3);
+    assert_eq!(problem.agrees("eight rows per column"), Route::GramSvd);
     assert_eq!(taken(&problem), Some(Route::GramSvd));
-    let few = Problem::new(normal(590, 150, 18), 2, 0.3);
+    let few = Problem::new(normal(1100, 150, 18), 2, 0.3);
     assert_eq!(taken(&few), None);
-    assert_eq!(taken(&Problem::new(graded(900, 150, 1e6), 2, 0.3)), None);
+    assert_eq!(taken(&Problem::new(graded(1250, 150, 1e6), 2, 0.3)), None);
     // They may be numbers of rows, of which one is left out.
-    problem.weights = Some(Array1::from_shape_fn(900, |row| 1.0 + (row % 3) as f64));
+    problem.weights = Some(Array1::from_shape_fn(1250, |row| 1.0 + (row % 3) as f64));
     assert_eq!(taken(&problem), None);
-    problem.weights = Some(Array1::from_elem(900, 3.0));
+    problem.weights = Some(Array1::from_elem(1250, 3.0));
     assert_eq!(taken(&problem), Some(Route::GramSvd));
 }

@@ -39,7 +39,7 @@ impl Threshold {
     /// From these on sums of products, where their condition allows them, take less time than a
     /// factorization of the matrix.
     pub(super) const PRODUCTS: Self = Self {
-        rows_per_column: 4,
+        rows_per_column: 8,
         entries: 1 << 17,
     };
 
@@ -53,19 +53,37 @@ impl Threshold {
     }
 }
 
-/// Whether the condition of these sums of products may be one that they are good for: pivots bound the
-/// smallest singular value from above, columns the largest from below.
+/// Whether the condition of these sums of products may be one that they are good for: inverse iteration
+/// bounds the smallest eigenvalue from above, and comes near it, columns bound the largest from below.
 fn may_be_conditioned(products: Array2<f64>) -> bool {
+    const STEPS: usize = 4;
     let largest = products.diag().fold(0.0, |m: f64, v| m.max(*v));
     // Without a factor the condition is far beyond what is asked for.
-    f64::cholesky(products).is_ok_and(|factor| {
-        let smallest = factor.diag().fold(f64::INFINITY, |m: f64, v| m.min(*v));
-        gram::allowed::<f64>(smallest * smallest / largest)
-    })
+    let Ok(factor) = f64::cholesky(products) else {
+        return false;
+    };
+    let mut vector: Array2<f64> = Array2::from_elem((factor.nrows(), 1), 1.0);
+    let mut smallest = f64::INFINITY;
+    for _ in 0..STEPS {
+        let length = vector.column(0).dot(&vector.column(0)).sqrt();
+        vector /= length;
+        let Ok(half) = f64::solve_lower(&factor, vector.view()) else {
+            return false;
+        };
+        // The inverse's Rayleigh quotient.
+        smallest = smallest.min(half.column(0).dot(&half.column(0)).recip());
+        let Ok(next) = f64::solve_lower_transposed(&factor, half.view()) else {
+            return false;
+        };
+        vector = next;
+    }
+    gram::allowed::<f64>(smallest / largest)
 }
 
-/// Rows of a sample, in units of the columns: enough to see what the condition is about.
+/// Rows of a sample, in units of the columns: enough to see what the condition is about. At most a quarter
+/// of the rows, but for the fewest that show it.
 const SAMPLE: usize = 4;
+const LEAST_SAMPLE: usize = 2;
 /// Rows below which a sample's means are not yet near those of all rows.
 const MIN_SAMPLE: usize = 256;
 /// Rows that enter the triangle together, in units of the columns: what is factorized again with
@@ -214,20 +232,14 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         Ok(wide.slice(s![..rows.len(), ..]))
     }
 
-    /// Looks at rows from everywhere: sets the shift, and says whether the sums of products may do; nothing
-    /// where that would take a quarter of the rows, and the sums themselves tell.
+    /// Looks at rows from everywhere: sets the shift, and says whether the sums of products may do.
     ///
     /// # Errors
     /// Those of making the rows.
-    fn look(&mut self) -> Result<Option<bool>> {
+    fn look(&mut self) -> Result<bool> {
         let width = self.source.width();
-        let wanted = (SAMPLE * width).max(MIN_SAMPLE);
-        let is_sampled = wanted <= self.rows() / 4;
-        let wanted = if is_sampled {
-            wanted
-        } else {
-            MIN_SAMPLE.min(self.rows())
-        };
+        let some = (self.rows() / 4).clamp(LEAST_SAMPLE * width, SAMPLE * width);
+        let wanted = some.max(MIN_SAMPLE).min(self.rows());
         let mut sample = Vec::with_capacity(wanted * width);
         let mut roots = Vec::with_capacity(wanted);
         let zeros = vec![0.0; self.shift.len()];
@@ -247,16 +259,13 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         }
         let neurons = self.neurons();
         let Ok(sample) = ArrayView2::from_shape((sample.len() / width, width), &sample) else {
-            return Ok(Some(false));
+            return Ok(false);
         };
         if !sample.iter().all(|value| value.is_finite()) {
-            return Ok(Some(false));
-        }
-        if !is_sampled {
-            return Ok(None);
+            return Ok(false);
         }
         let products = f64::gram(sample.slice(s![.., ..neurons]));
-        Ok(Some(may_be_conditioned(products)))
+        Ok(may_be_conditioned(products))
     }
 
     /// The problem in the coordinates of its singular vectors, or nothing where the numbers are out
@@ -294,8 +303,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     pub(super) fn spectrum_of_products(&mut self) -> Result<Option<DesignSvd<f64>>> {
         /// The least share of the targets' squares that must be left.
         const UNEXPLAINED: f64 = 1e-6;
-        let looked = self.look()?;
-        if looked == Some(false) {
+        if !self.look()? {
             return Ok(None);
         }
         let width = self.source.width();
@@ -318,9 +326,6 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
             return Ok(None);
         }
         let gram = &moments.gram;
-        if looked.is_none() && !may_be_conditioned(gram.clone()) {
-            return Ok(None);
-        }
         let Eigen { values: s, vt } = f64::eigen(gram.view())?;
         let (Some(&largest), Some(&smallest)) = (s.first(), s.last()) else {
             return Ok(None);
