@@ -35,7 +35,13 @@ struct Arguments {
     #[command(subcommand)]
     command: Command,
     /// Threads; no digit of a result depends on them. 0: as many as the machine has.
-    #[arg(long, global = true, value_name = "N", default_value_t = 0, display_order = 900)]
+    #[arg(
+        long,
+        global = true,
+        value_name = "N",
+        default_value_t = 0,
+        display_order = 900
+    )]
     threads: usize,
 }
 
