@@ -30,6 +30,9 @@ pub(crate) struct DesignSvd<A: Scalar> {
     pub(crate) residual_ss: Array1<A>,
     /// The sum of squares of each column as predictions see it: scaled but not centered.
     pub(crate) lengths: Array1<A>,
+    /// The weakest relative strength of ridge that this serves; nothing where it serves all. Sums of products
+    /// of a bad condition have no digits of directions that weaker ones do not hold back.
+    pub(crate) weakest: Option<f64>,
     pub(crate) frame: Equilibration<A>,
 }
 
@@ -112,6 +115,7 @@ impl<A: Scalar> DesignSvd<A> {
             c,
             residual_ss,
             lengths,
+            weakest: None,
             frame,
         })
     }
@@ -165,13 +169,15 @@ impl<A: Scalar> DesignSvd<A> {
                 .map_or(0.0, |&s| self.frame.singular_value_in_original_units(s))
         };
         let (largest, smallest) = (singular_value(0), singular_value(rank.max(1) - 1));
+        let condition = if rank == 0 { 1.0 } else { largest / smallest };
+        let known = self.weakest.is_none();
         let diagnosis = Diagnosis {
             route: self.route,
             reason,
-            rank: Some(rank),
-            condition: Some(if rank == 0 { 1.0 } else { largest / smallest }),
+            rank: known.then_some(rank),
+            condition: known.then_some(condition),
             largest_singular_value: largest,
-            smallest_singular_value: Some(smallest),
+            smallest_singular_value: known.then_some(smallest),
             lambda,
             degrees_of_freedom: (0..outputs)
                 .map(|o| kept(o).sum().as_f64() + constant)
@@ -318,6 +324,7 @@ impl<A: Scalar> DesignSvdWithRows<A> {
                 residual_ss: Array1::zeros(targets.ncols()),
                 c,
                 lengths,
+                weakest: None,
                 frame,
             },
             constant,

@@ -29,8 +29,9 @@ pub enum Route {
     Given,
     /// QR, then back substitution.
     Qr,
-    /// Singular values from $H^T H$, whose condition bounds the relative error that this leaves by
-    /// 1e-8: for at least eight rows to a neuron, which are made as they are needed.
+    /// Singular values from $H^T H$, whose condition, or the strength of ridge that was found, bounds the
+    /// relative error that this leaves by 1e-8: for at least four rows to a neuron, which are made as they
+    /// are needed.
     GramSvd,
 }
 
@@ -93,7 +94,8 @@ pub struct Diagnosis {
     /// Why it was computed that way.
     pub reason: Reason,
     /// Number of singular values above the cut-off (for ridge: above rounding error); `None` on
-    /// the routes that do not find them, [`Route::Gram`] and [`Route::DualGram`].
+    /// the routes that do not find them, [`Route::Gram`] and [`Route::DualGram`], and on
+    /// [`Route::GramSvd`] where the strength of ridge made up for the condition.
     pub rank: Option<usize>,
     /// Largest over smallest singular value counted in [`rank`](Self::rank), 1 at rank 0; `None`
     /// with it.

@@ -20,8 +20,11 @@ use super::normal_equations::{NormalEquations, RowSource};
 use super::norms::norm;
 use super::symmetric::Symmetric;
 use crate::error::Result;
-use crate::linalg::CholeskySolve;
+use crate::linalg::{Backend, CholeskySolve};
 use crate::scalar::Scalar;
+
+/// The least share of the targets' squares that must be left where a residual is a difference of sums.
+pub(super) const UNEXPLAINED: f64 = 1e-6;
 
 /// The relative error that output weights may have by this route.
 fn accuracy<A: Scalar>() -> f64 {
@@ -37,6 +40,74 @@ fn accuracy<A: Scalar>() -> f64 {
 pub(super) fn allowed<A: Scalar>(lambda: f64) -> bool {
     // The upper bound keeps the diagonal far from overflow in either type.
     lambda * accuracy::<A>() >= A::epsilon().as_f64() && lambda <= 1e6
+}
+
+/// The weakest strength that is [`allowed`] in `f64`.
+pub(super) fn weakest() -> f64 {
+    f64::EPSILON / accuracy::<f64>()
+}
+
+/// Sums of products of centered rows.
+pub(super) struct Sums {
+    /// $H^T H$, the lower half.
+    pub(super) products: Array2<f64>,
+    /// $H^T T$.
+    pub(super) right: Array2<f64>,
+    /// $\lVert T \rVert^2$ of each output.
+    pub(super) squares: Array1<f64>,
+    pub(super) rows: f64,
+}
+
+/// Whether generalized cross-validation calls for a strength that is [`allowed`], for every output, as far
+/// as these sums tell: whether its score rises from ten times the weakest such strength to that one.
+pub(super) fn holds_back(sums: &Sums) -> bool {
+    let Sums {
+        products,
+        right,
+        squares,
+        rows,
+    } = sums;
+    let neurons = products.ncols() as f64;
+    let gram = Symmetric::of_lower(products);
+    let Some(largest) = largest_eigenvalue(&gram) else {
+        return false;
+    };
+    let score = |lambda: f64| -> Option<Array1<f64>> {
+        let mut shifted = products.clone();
+        let mut diagonal = shifted.diag_mut();
+        diagonal += lambda * largest;
+        let CholeskySolve { x, inverse_trace } =
+            f64::solve_positive(shifted.view(), right.view()).ok()?;
+        let free = rows - neurons + lambda * largest * inverse_trace;
+        let left = residual_squares(&gram, right, squares, &x);
+        // Small differences of large numbers have no digits.
+        let known = left
+            .iter()
+            .zip(squares)
+            .all(|(left, all)| *left > UNEXPLAINED * all);
+        known.then(|| left / (free * free))
+    };
+    let (Some(weak), Some(stronger)) = (score(weakest()), score(10.0 * weakest())) else {
+        return false;
+    };
+    weak.iter()
+        .zip(&stronger)
+        .all(|(weak, stronger)| weak > stronger)
+}
+
+/// $\lVert T - H x \rVert^2$ of each output from $H^T H$, $H^T T$ and $\lVert T \rVert^2$.
+fn residual_squares<A: Scalar>(
+    gram: &Symmetric<A>,
+    right: &Array2<A>,
+    squares: &Array1<A>,
+    x: &Array2<A>,
+) -> Array1<A> {
+    let left = |output: usize| {
+        let (beta, right) = (x.column(output).to_owned(), right.column(output));
+        let fitted = gram.product(&beta);
+        squares[output] - beta.dot(&(&right * A::from_f64(2.0) - fitted))
+    };
+    (0..x.ncols()).map(left).collect()
 }
 
 /// The ridge solution of a problem with at least as many rows as neurons, whose hidden-layer
@@ -74,12 +145,7 @@ pub(super) fn solve_rows<A: Scalar>(
     };
     let CholeskySolve { x, inverse_trace } = solved;
     // |t - H b|^2 from the sums, where it is not a small difference of large numbers.
-    let mut squares = Array1::zeros(x.ncols());
-    for (output, square) in squares.iter_mut().enumerate() {
-        let (beta, right) = (x.column(output).to_owned(), moments.right.column(output));
-        let fitted = gram.product(&beta);
-        *square = moments.squares[output] - beta.dot(&(&right * A::from_f64(2.0) - fitted));
-    }
+    let mut squares = residual_squares(&gram, &moments.right, &moments.squares, &x);
     let trusted = A::from_f64(100.0) * A::epsilon().sqrt();
     let small = |(&square, &whole): (&A, &A)| square < trusted * whole || whole == A::zero();
     if squares.iter().zip(&moments.squares).any(small) {

@@ -31,9 +31,11 @@ pub(super) fn distinguishable_lambdas<A: Scalar>(spectrum: &DesignSvd<A>) -> Vec
     };
     // Below `dense` only the last per cent of the smallest direction is at stake.
     let (first, dense) = (step(smallest * f64::EPSILON), step(smallest * 1e-2));
+    let weakest = spectrum.weakest.unwrap_or(0.0);
     grid(first)
         .filter(|step| *step >= dense || (dense - step) % (2 * STEPS_PER_DECADE) == 0)
         .map(strength)
+        .filter(|strength| *strength >= weakest)
         .collect()
 }
 

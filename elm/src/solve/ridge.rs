@@ -1,14 +1,15 @@
 //! Regularized least squares: $\beta = \arg\min \lVert H\beta - T\rVert^2 + \lambda
 //! s_1^2 \lVert\beta\rVert^2$.
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip, s};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, s};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use super::design_svd::{DesignSvd, DesignSvdWithRows};
 use super::equilibration::EquilibratedProblem;
+use super::gcv::gcv_scores;
 use super::lambda_grid::{FIRST_STEP, distinguishable_lambdas, grid, strength};
-use super::leave_one_out::{self, NEGLIGIBLE};
+use super::leave_one_out;
 use super::normal_equations::RowSource;
 use super::tiles::{Threshold, Tiles};
 use super::{LeastSquares, Reason, Solution, gram};
@@ -178,8 +179,8 @@ impl Ridge {
 
     /// The answer from rows that need not stand in memory together: where a given strength allows
     /// the normal equations and there are at least as many rows as neurons; where there are many more
-    /// rows than neurons; and for a search with at least eight rows to a neuron where the condition
-    /// allows sums of products.
+    /// rows than neurons; and for a search with at least four rows to a neuron where the condition, or the
+    /// strength that is found, allows sums of products.
     pub(super) fn solve_rows<A: Scalar>(
         self,
         source: &RowSource<'_, A>,
@@ -206,26 +207,55 @@ impl Ridge {
                 let Some(mut tiles) = Tiles::new(source, Threshold::PRODUCTS)? else {
                     return Ok(None);
                 };
-                let spectrum = if is(Threshold::TRIANGLE) {
-                    tiles.spectrum()?
-                } else if tiles.frame.weights_differ() {
+                let triangle = is(Threshold::TRIANGLE);
+                if !triangle && tiles.frame.weights_differ() {
                     // They may be numbers of rows, of which one is to be left out.
-                    None
-                } else {
-                    tiles.spectrum_of_products()?
-                };
-                let Some(spectrum) = spectrum else {
                     return Ok(None);
-                };
-                let solution = self.search_tiles(&mut tiles, &spectrum, unit_roundoff::<A>())?;
-                Ok(Some(solution.narrow()))
+                }
+                let found = self.search_many(&mut tiles, triangle, unit_roundoff::<A>())?;
+                Ok(found.map(Solution::narrow))
             }
             _ => Ok(None),
         }
     }
 
+    /// As [`search`](Self::search), for many rows: by sums of products, or nothing where these are not good
+    /// enough, unless the `triangle` may be made.
+    pub(super) fn search_many<A: Scalar>(
+        self,
+        tiles: &mut Tiles<'_, '_, A>,
+        triangle: bool,
+        roundoff: f64,
+    ) -> Result<Option<Solution<f64>>> {
+        if let Some(spectrum) = tiles.spectrum_of_products()?
+            && self.is_served(&spectrum, roundoff)
+        {
+            return self.search_tiles(tiles, &spectrum, roundoff).map(Some);
+        }
+        if !triangle {
+            return Ok(None);
+        }
+        let Some(spectrum) = tiles.spectrum_of_triangle()? else {
+            return Ok(None);
+        };
+        self.search_tiles(tiles, &spectrum, roundoff).map(Some)
+    }
+
+    /// Whether this spectrum serves the best strength by generalized cross-validation.
+    fn is_served(self, spectrum: &DesignSvd<f64>, roundoff: f64) -> bool {
+        /// Steps of the grid.
+        const ABOVE: usize = 2;
+        if spectrum.weakest.is_none() {
+            return true;
+        }
+        let candidates = distinguishable_lambdas(spectrum);
+        let scores = gcv_scores(spectrum, &candidates, roundoff);
+        let mut columns = scores.columns().into_iter();
+        columns.all(|scores| Self::last_within(scores, 0.0) >= ABOVE)
+    }
+
     /// As [`search`](Self::search), for many rows of this spectrum.
-    pub(super) fn search_tiles<A: Scalar>(
+    fn search_tiles<A: Scalar>(
         self,
         tiles: &mut Tiles<'_, '_, A>,
         spectrum: &DesignSvd<f64>,
@@ -444,34 +474,6 @@ pub(crate) fn ridge_solution<A: Scalar>(
         lambda.to_vec(),
         leave_one_out,
     )
-}
-
-/// $n \cdot \text{RSS} / (n - \text{df})^2$ for each candidate and output, shape (candidates,
-/// outputs), in units of the scaled targets. RSS has in it what rounding is to add to it.
-fn gcv_scores<A: Scalar>(
-    spectrum: &DesignSvd<A>,
-    candidates: &[f64],
-    roundoff: f64,
-) -> Array2<f64> {
-    let mut scores = Array2::zeros((candidates.len(), spectrum.c.ncols()));
-    for (mut row, &lambda) in scores.rows_mut().into_iter().zip(candidates) {
-        let complements = spectrum.filter_complements(A::from_f64(lambda));
-        let spare = spectrum.spare_rows() as f64 + complements.sum().as_f64();
-        for (output, score) in row.iter_mut().enumerate() {
-            let rest = Zip::from(spectrum.c.column(output))
-                .and(&complements)
-                .fold(spectrum.residual_ss[output], |sum, &c, &h| {
-                    sum + (c * h).powi(2)
-                });
-            *score = rest.as_f64();
-        }
-        let kept = spectrum.filter_factors(A::from_f64(lambda));
-        let rounding = spectrum.rounding_squares(&kept, roundoff, |o| NEGLIGIBLE * row[o]);
-        for (score, rounding) in row.iter_mut().zip(rounding) {
-            *score = (*score + rounding) / (spare * spare);
-        }
-    }
-    scores
 }
 
 impl<A: Scalar> DesignSvdWithRows<A> {

@@ -73,9 +73,9 @@ impl<A: Scalar> Problem<A> {
     fn by_tiles(&self, ridge: Ridge) -> Solution<f64> {
         let source = self.source();
         let mut tiles = Tiles::new(&source, Threshold::PRODUCTS).unwrap().unwrap();
-        let spectrum = tiles.spectrum().unwrap().unwrap();
         let roundoff = A::epsilon().as_f64() / 2.0;
-        ridge.search_tiles(&mut tiles, &spectrum, roundoff).unwrap()
+        let found = ridge.search_many(&mut tiles, true, roundoff).unwrap();
+        found.unwrap()
     }
 
     fn by_matrix(&self, ridge: Ridge) -> Solution<f64> {
@@ -119,7 +119,9 @@ impl<A: Scalar> Problem<A> {
             let bound = bound(route, condition, self.hidden.dim());
             let apart = self.apart(&tiles, &matrix);
             assert!(apart <= bound, "{name}, {ridge:?}: {apart:e} > {bound:e}");
-            assert_eq!(d.rank, e.rank, "{name}");
+            if d.rank.is_some() {
+                assert_eq!(d.rank, e.rank, "{name}");
+            }
             close(&d.degrees_of_freedom, &e.degrees_of_freedom, bound, name);
             close(&d.residual_norm, &e.residual_norm, 1e-6, name);
             if let (Some(d), Some(e)) = (&d.leave_one_out, &e.leave_one_out) {
@@ -183,17 +185,39 @@ fn well_conditioned_problems_go_by_sums_of_products_and_agree() {
     }
 }
 
-#[test]
-fn badly_conditioned_problems_go_by_the_triangle_and_agree() {
-    for (name, hidden) in [
+/// Problems whose sums of products are of rounding in some directions.
+fn badly_conditioned() -> [(&'static str, Array2<f64>); 3] {
+    [
         ("graded", graded(900, 14, 1e9)),
         ("smooth", smooth(1100, 20)),
         ("deficient", normal(900, 4, 7).dot(&normal(4, 15, 8))),
-    ] {
+    ]
+}
+
+#[test]
+fn badly_conditioned_problems_go_by_sums_of_products_where_noise_calls_for_strength() {
+    for (name, hidden) in badly_conditioned() {
         for intercept in [true, false] {
-            let mut problem = Problem::new(hidden.clone(), 2, 0.3);
+            let mut problem = Problem::new(hidden.clone(), 2, 0.0);
+            // Strengths are relative to the largest squared singular value.
+            let size = hidden.mapv(|h| h * h).sum().sqrt();
+            problem.targets += &(normal(hidden.nrows(), 2, 93) * (0.1 * size));
             problem.intercept = intercept;
-            assert_eq!(problem.agrees(name), Route::QrSvd);
+            assert_eq!(problem.agrees(name), Route::GramSvd, "{name}");
+            assert_eq!(problem.by_tiles(Ridge::default()).diagnosis.rank, None);
+        }
+    }
+}
+
+#[test]
+fn badly_conditioned_problems_of_little_noise_go_by_the_triangle_and_agree() {
+    for (name, hidden) in badly_conditioned() {
+        for intercept in [true, false] {
+            let mut problem = Problem::new(hidden.clone(), 2, 1e-9);
+            // A constant is noise to a fit without an intercept.
+            problem.targets -= 3.0;
+            problem.intercept = intercept;
+            assert_eq!(problem.agrees(name), Route::QrSvd, "{name}");
         }
     }
 }
@@ -329,12 +353,19 @@ fn sums_of_products_serve_few_rows_where_their_condition_allows_it() {
         let solution = Ridge::default().solve_rows(&problem.source()).unwrap();
         solution.map(|solution| solution.diagnosis.route)
     };
-    let mut problem = Problem::new(normal(1250, 150, 17), 2, 0.3);
-    assert_eq!(problem.agrees("eight rows per column"), Route::GramSvd);
-    assert_eq!(taken(&problem), Some(Route::GramSvd));
-    let few = Problem::new(normal(1100, 150, 18), 2, 0.3);
+    for rows in [1500, 1100, 745] {
+        let problem = Problem::new(normal(rows, 180, 17), 2, 0.3);
+        assert_eq!(
+            problem.agrees("more than four rows per column"),
+            Route::GramSvd
+        );
+        assert_eq!(taken(&problem), Some(Route::GramSvd));
+        let problem = Problem::new(graded(rows, 180, 1e6), 2, 1e-9);
+        assert_eq!(taken(&problem), None);
+    }
+    let few = Problem::new(normal(715, 180, 18), 2, 0.3);
     assert_eq!(taken(&few), None);
-    assert_eq!(taken(&Problem::new(graded(1250, 150, 1e6), 2, 0.3)), None);
+    let mut problem = Problem::new(normal(1250, 150, 17), 2, 0.3);
     // They may be numbers of rows, of which one is left out.
     problem.weights = Some(Array1::from_shape_fn(1250, |row| 1.0 + (row % 3) as f64));
     assert_eq!(taken(&problem), None);

@@ -6,17 +6,15 @@
 
 use std::ops::Range;
 
-use ndarray::{Array1, Array2, ArrayView2, Axis, ShapeBuilder, s};
+use ndarray::{Array1, Array2, ArrayView2, Axis, s};
 
-use super::Route;
 use super::design_svd::DesignSvd;
 use super::equilibration::{Equilibration, magnitudes};
-use super::gram;
-use super::normal_equations::{NormalEquations, RowSource, center_of, runs, spread_runs};
+use super::normal_equations::{RowSource, center_of, runs, spread_runs};
 use super::stack::Stack;
 use crate::error::Result;
 use crate::feature_map::TileBuffers;
-use crate::linalg::{Backend, Eigen, QrFactor};
+use crate::linalg::QrFactor;
 use crate::scalar::{Scalar, power_of_two};
 use crate::threads;
 
@@ -36,10 +34,10 @@ impl Threshold {
         rows_per_column: 16,
         entries: 1 << 20,
     };
-    /// From these on sums of products, where their condition allows them, take less time than a
-    /// factorization of the matrix.
+    /// From these on sums of products, where their condition or the strength of ridge allows them, take less
+    /// time than a factorization of the matrix.
     pub(super) const PRODUCTS: Self = Self {
-        rows_per_column: 8,
+        rows_per_column: 4,
         entries: 1 << 17,
     };
 
@@ -53,39 +51,12 @@ impl Threshold {
     }
 }
 
-/// Whether the condition of these sums of products may be one that they are good for: inverse iteration
-/// bounds the smallest eigenvalue from above, and comes near it, columns bound the largest from below.
-fn may_be_conditioned(products: Array2<f64>) -> bool {
-    const STEPS: usize = 4;
-    let largest = products.diag().fold(0.0, |m: f64, v| m.max(*v));
-    // Without a factor the condition is far beyond what is asked for.
-    let Ok(factor) = f64::cholesky(products) else {
-        return false;
-    };
-    let mut vector: Array2<f64> = Array2::from_elem((factor.nrows(), 1), 1.0);
-    let mut smallest = f64::INFINITY;
-    for _ in 0..STEPS {
-        let length = vector.column(0).dot(&vector.column(0)).sqrt();
-        vector /= length;
-        let Ok(half) = f64::solve_lower(&factor, vector.view()) else {
-            return false;
-        };
-        // The inverse's Rayleigh quotient.
-        smallest = smallest.min(half.column(0).dot(&half.column(0)).recip());
-        let Ok(next) = f64::solve_lower_transposed(&factor, half.view()) else {
-            return false;
-        };
-        vector = next;
-    }
-    gram::allowed::<f64>(smallest / largest)
-}
-
 /// Rows of a sample, in units of the columns: enough to see what the condition is about. At most a quarter
-/// of the rows, but for the fewest that show it.
+/// of the rows; of fewer than that takes none is taken.
 const SAMPLE: usize = 4;
 const LEAST_SAMPLE: usize = 2;
 /// Rows below which a sample's means are not yet near those of all rows.
-const MIN_SAMPLE: usize = 256;
+pub(super) const MIN_SAMPLE: usize = 256;
 /// Rows that enter the triangle together, in units of the columns: what is factorized again with
 /// every block is a small part of it.
 const BLOCK: usize = 6;
@@ -94,12 +65,12 @@ const TILE_BYTES: usize = 1 << 20;
 
 /// The rows of a problem in `f64`: weighted, divided by powers of two, and less a shift.
 pub(super) struct Tiles<'s, 'a, A: Scalar> {
-    source: &'s RowSource<'a, A>,
+    pub(super) source: &'s RowSource<'a, A>,
     /// Without means until they are known.
     pub(super) frame: Equilibration<f64>,
     /// Of hidden values and targets, in units of their scale: near the means, for a column that is
     /// constant its value. 0 without an intercept.
-    shift: Vec<f64>,
+    pub(super) shift: Vec<f64>,
 }
 
 /// Working memory for a tile of rows, and its result.
@@ -135,7 +106,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         }))
     }
 
-    fn rows(&self) -> usize {
+    pub(super) fn rows(&self) -> usize {
         self.frame.rows
     }
 
@@ -167,7 +138,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     }
 
     /// Whether any of these rows has a weight.
-    fn is_empty(&self, rows: Range<usize>) -> bool {
+    pub(super) fn is_empty(&self, rows: Range<usize>) -> bool {
         let roots = self.frame.root_weights.slice(s![rows]);
         roots.iter().all(|root| *root == 0.0)
     }
@@ -232,14 +203,13 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         Ok(wide.slice(s![..rows.len(), ..]))
     }
 
-    /// Looks at rows from everywhere: sets the shift, and says whether the sums of products may do.
+    /// At least so many rows from everywhere, less their center, which the shift is set to.
     ///
     /// # Errors
     /// Those of making the rows.
-    fn look(&mut self) -> Result<bool> {
+    pub(super) fn look(&mut self, wanted: usize) -> Result<Array2<f64>> {
         let width = self.source.width();
-        let some = (self.rows() / 4).clamp(LEAST_SAMPLE * width, SAMPLE * width);
-        let wanted = some.max(MIN_SAMPLE).min(self.rows());
+        let wanted = wanted.max(MIN_SAMPLE).min(self.rows());
         let mut sample = Vec::with_capacity(wanted * width);
         let mut roots = Vec::with_capacity(wanted);
         let zeros = vec![0.0; self.shift.len()];
@@ -257,26 +227,22 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
                 }
             }
         }
-        let neurons = self.neurons();
-        let Ok(sample) = ArrayView2::from_shape((sample.len() / width, width), &sample) else {
-            return Ok(false);
-        };
-        if !sample.iter().all(|value| value.is_finite()) {
-            return Ok(false);
-        }
-        let products = f64::gram(sample.slice(s![.., ..neurons]));
-        Ok(may_be_conditioned(products))
+        let shape = (sample.len() / width, width);
+        Ok(Array2::from_shape_vec(shape, sample).unwrap_or_default())
     }
 
-    /// The problem in the coordinates of its singular vectors, or nothing where the numbers are out
-    /// of range. From sums of products where their condition allows it, else from the triangle.
+    /// Rows of a sample that tells what the condition is about.
+    pub(super) fn sample_rows(&self) -> usize {
+        let width = self.source.width();
+        (self.rows() / 4).clamp(LEAST_SAMPLE * width, SAMPLE * width)
+    }
+
+    /// The problem in the coordinates of its singular vectors, from the triangle; or nothing where the
+    /// numbers are out of range. Rows have been looked at.
     ///
     /// # Errors
     /// Those of making the rows and of the factorizations.
-    pub(super) fn spectrum(&mut self) -> Result<Option<DesignSvd<f64>>> {
-        if let Some(spectrum) = self.spectrum_of_products()? {
-            return Ok(Some(spectrum));
-        }
+    pub(super) fn spectrum_of_triangle(&self) -> Result<Option<DesignSvd<f64>>> {
         let Some((triangle, frame)) = self.triangle()? else {
             return Ok(None);
         };
@@ -291,69 +257,8 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     pub(super) fn centered_triangle(
         &mut self,
     ) -> Result<Option<(QrFactor<f64>, Equilibration<f64>)>> {
-        self.look()?;
+        self.look(self.sample_rows())?;
         self.triangle()
-    }
-
-    /// As [`spectrum`](Self::spectrum), by the singular values of the sums of products, where those are well
-    /// enough conditioned and the targets not explained down to where sums of squares have no digits.
-    ///
-    /// # Errors
-    /// Those of making the rows and of the factorization.
-    pub(super) fn spectrum_of_products(&mut self) -> Result<Option<DesignSvd<f64>>> {
-        /// The least share of the targets' squares that must be left.
-        const UNEXPLAINED: f64 = 1e-6;
-        if !self.look()? {
-            return Ok(None);
-        }
-        let width = self.source.width();
-        let rows = &*self;
-        let sums_of = |part: Range<usize>| {
-            let mut sums = Array2::zeros((width, width).f());
-            let (mut memory, mut scratch) = (rows.memory(), Vec::new());
-            for range in rows.ranges(part) {
-                if !rows.is_empty(range.clone()) {
-                    let tile = rows.tile(range, &rows.shift, &mut memory)?;
-                    f64::add_gram(tile, &mut sums, &mut scratch);
-                }
-            }
-            Ok(sums)
-        };
-        let sums = threads::reduce(self.parts(), sums_of, |sums, part| *sums += &part)?;
-        let sums = sums.unwrap_or_else(|| Array2::zeros((width, width).f()));
-        let moments = NormalEquations::of_sums(&sums, self.frame.clone(), self.shift.clone());
-        if !moments.in_range() {
-            return Ok(None);
-        }
-        let gram = &moments.gram;
-        let Eigen { values: s, vt } = f64::eigen(gram.view())?;
-        let (Some(&largest), Some(&smallest)) = (s.first(), s.last()) else {
-            return Ok(None);
-        };
-        // With the correction c errors are as if the condition were (1 + c / s_1^2) times as large.
-        let condition = largest / smallest * (1.0 + moments.correction / largest);
-        if !gram::allowed::<f64>(condition.recip()) {
-            return Ok(None);
-        }
-        let s = s.mapv_into(f64::sqrt);
-        let c = f64::product(vt.view(), moments.right.view()) / s.view().insert_axis(Axis(1));
-        let residual_ss = &moments.squares - &squares(c.view());
-        let explained = |(&left, &all): (&f64, &f64)| all > 0.0 && left < UNEXPLAINED * all;
-        if residual_ss.iter().zip(&moments.squares).any(explained) {
-            return Ok(None);
-        }
-        let frame = moments.frame;
-        let mean = &frame.hidden_mean / frame.hidden_scale;
-        let lengths = &gram.diag() + &mean.mapv_into(|m| m * m * frame.total_weight);
-        Ok(Some(DesignSvd {
-            route: Route::GramSvd,
-            s,
-            vt,
-            c,
-            residual_ss,
-            lengths,
-            frame,
-        }))
     }
 
     /// The triangle of the ones, where there is an intercept, and the hidden values of all rows but
@@ -470,7 +375,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
 }
 
 /// Sum of squares of each column.
-fn squares(matrix: ArrayView2<'_, f64>) -> Array1<f64> {
+pub(super) fn squares(matrix: ArrayView2<'_, f64>) -> Array1<f64> {
     matrix.map_axis(Axis(0), |column| column.dot(&column))
 }
 
