@@ -2,7 +2,9 @@
 
 use ndarray::{Array2, Zip};
 
+use super::Ridge;
 use super::design_svd::DesignSvd;
+use super::lambda_grid::all_distinguishable_lambdas;
 use super::leave_one_out::NEGLIGIBLE;
 use crate::scalar::Scalar;
 
@@ -32,4 +34,19 @@ pub(super) fn gcv_scores<A: Scalar>(
         }
     }
     scores
+}
+
+/// Whether this spectrum serves the best strength of every output by these scores. Those of weaker strengths
+/// than it serves lack digits, and are good enough to tell whether one of these is better.
+pub(super) fn serves(spectrum: &DesignSvd<f64>, roundoff: f64) -> bool {
+    /// Steps of the grid that the best must be above the weakest.
+    const ABOVE: usize = 2;
+    let Some(weakest) = spectrum.weakest else {
+        return true;
+    };
+    let candidates = all_distinguishable_lambdas(spectrum);
+    let first = candidates.partition_point(|strength| *strength < weakest);
+    let scores = gcv_scores(spectrum, &candidates, roundoff);
+    let mut columns = scores.columns().into_iter();
+    columns.all(|scores| Ridge::last_within(scores, 0.0) >= first + ABOVE)
 }

@@ -19,8 +19,16 @@ pub(super) fn strength(step: i32) -> f64 {
     10.0_f64.powf(f64::from(step) / f64::from(STEPS_PER_DECADE))
 }
 
-/// The candidates that make a difference to this problem, rising.
+/// The candidates that make a difference to this problem and that its spectrum serves, rising.
 pub(super) fn distinguishable_lambdas<A: Scalar>(spectrum: &DesignSvd<A>) -> Vec<f64> {
+    let weakest = spectrum.weakest.unwrap_or(0.0);
+    let mut candidates = all_distinguishable_lambdas(spectrum);
+    candidates.retain(|strength| *strength >= weakest);
+    candidates
+}
+
+/// Also those that the spectrum does not serve.
+pub(super) fn all_distinguishable_lambdas<A: Scalar>(spectrum: &DesignSvd<A>) -> Vec<f64> {
     let smallest = match (spectrum.s.first(), spectrum.s.last()) {
         (Some(&first), Some(&last)) => (last / first).as_f64().powi(2),
         _ => 1.0,
@@ -31,11 +39,9 @@ pub(super) fn distinguishable_lambdas<A: Scalar>(spectrum: &DesignSvd<A>) -> Vec
     };
     // Below `dense` only the last per cent of the smallest direction is at stake.
     let (first, dense) = (step(smallest * f64::EPSILON), step(smallest * 1e-2));
-    let weakest = spectrum.weakest.unwrap_or(0.0);
     grid(first)
         .filter(|step| *step >= dense || (dense - step) % (2 * STEPS_PER_DECADE) == 0)
         .map(strength)
-        .filter(|strength| *strength >= weakest)
         .collect()
 }
 

@@ -154,7 +154,8 @@ pub(super) fn scores<A: Scalar>(
 ///
 /// A row has the coordinates $u = \\tilde h V / s$ in the singular vectors. Where it all but determines its
 /// own fit, $1 - \\sum_j u_j^2$ has no digits left: there are no more such rows than neurons, and these are
-/// scored from a problem in which the triangle of the other rows stands for them.
+/// scored from a problem in which the triangle of the other rows stands for them. Nothing where the spectrum
+/// does not serve all strengths: what such rows call for may be one of the others.
 ///
 /// # Errors
 /// Those of making the rows and of the factorizations.
@@ -163,7 +164,7 @@ pub(super) fn scores_of_tiles<A: Scalar>(
     spectrum: &DesignSvd<f64>,
     candidates: &[f64],
     roundoff: f64,
-) -> Result<Array2<f64>> {
+) -> Result<Option<Array2<f64>>> {
     let mean = means(spectrum);
     let condition = match (spectrum.s.first(), spectrum.s.last()) {
         (Some(first), Some(last)) => first / last,
@@ -206,11 +207,14 @@ pub(super) fn scores_of_tiles<A: Scalar>(
         pass.scores.sums += &squared_residuals(spectrum, candidates);
     }
     if !pass.close.is_empty() {
+        if spectrum.weakest.is_some() {
+            return Ok(None);
+        }
         let close = &pass.close;
         pass.scores.sums +=
             &scores_of_close_rows(tiles, spectrum, &mean, close, candidates, single)?;
     }
-    Ok(pass.scores.finish(candidates, roundoff))
+    Ok(Some(pass.scores.finish(candidates, roundoff)))
 }
 
 /// The squared residuals of each candidate and output, which the spectrum knows: the least that scores
@@ -245,23 +249,24 @@ impl Pass<'_> {
         let (targets, ones) = rest.split_at(Axis(1), spectrum.c.ncols());
         let u = f64::product(hidden, self.to_u.view());
         let residual = &targets - &f64::product(u.view(), spectrum.c.view());
-        let mut one_minus_leverage = u.map_axis(Axis(1), |row| 1.0 - row.dot(&row));
+        let squared = u.mapv(|u| u * u);
+        let mut one_minus_leverage = squared.map_axis(Axis(1), |row| 1.0 - row.sum());
         if let Some(roots) = ones.columns().into_iter().next() {
             let total = spectrum.frame.total_weight;
             Zip::from(&mut one_minus_leverage)
                 .and(roots)
                 .for_each(|one_minus_leverage, root| *one_minus_leverage -= root * root / total);
         }
-        if one_minus_leverage
-            .iter()
-            .all(|one_minus_leverage| *one_minus_leverage >= CLOSE)
-        {
+        // What the weakest strength leaves of them; the others leave more.
+        let mut free = squared.dot(&self.scores.complements.column(0));
+        free += &one_minus_leverage;
+        if free.iter().all(|free| *free >= CLOSE) {
             self.scores
                 .add(u.view(), residual.view(), one_minus_leverage.view());
             return;
         }
         let (far, near): (Vec<usize>, Vec<usize>) =
-            (0..one_minus_leverage.len()).partition(|&row| one_minus_leverage[row] >= CLOSE);
+            (0..free.len()).partition(|&row| free[row] >= CLOSE);
         self.scores.add(
             u.select(Axis(0), &far).view(),
             residual.select(Axis(0), &far).view(),

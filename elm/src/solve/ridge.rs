@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::design_svd::{DesignSvd, DesignSvdWithRows};
 use super::equilibration::EquilibratedProblem;
-use super::gcv::gcv_scores;
+use super::gcv::{gcv_scores, serves};
 use super::lambda_grid::{FIRST_STEP, distinguishable_lambdas, grid, strength};
 use super::leave_one_out;
 use super::normal_equations::RowSource;
@@ -228,9 +228,10 @@ impl Ridge {
         roundoff: f64,
     ) -> Result<Option<Solution<f64>>> {
         if let Some(spectrum) = tiles.spectrum_of_products()?
-            && self.is_served(&spectrum, roundoff)
+            && serves(&spectrum, roundoff)
+            && let Some(solution) = self.search_tiles(tiles, &spectrum, roundoff)?
         {
-            return self.search_tiles(tiles, &spectrum, roundoff).map(Some);
+            return Ok(Some(solution));
         }
         if !triangle {
             return Ok(None);
@@ -238,33 +239,20 @@ impl Ridge {
         let Some(spectrum) = tiles.spectrum_of_triangle()? else {
             return Ok(None);
         };
-        self.search_tiles(tiles, &spectrum, roundoff).map(Some)
+        self.search_tiles(tiles, &spectrum, roundoff)
     }
 
-    /// Whether this spectrum serves the best strength by generalized cross-validation.
-    fn is_served(self, spectrum: &DesignSvd<f64>, roundoff: f64) -> bool {
-        /// Steps of the grid.
-        const ABOVE: usize = 2;
-        if spectrum.weakest.is_none() {
-            return true;
-        }
-        let candidates = distinguishable_lambdas(spectrum);
-        let scores = gcv_scores(spectrum, &candidates, roundoff);
-        let mut columns = scores.columns().into_iter();
-        columns.all(|scores| Self::last_within(scores, 0.0) >= ABOVE)
-    }
-
-    /// As [`search`](Self::search), for many rows of this spectrum.
+    /// As [`search`](Self::search), for many rows of this spectrum; or nothing where it does not serve these.
     fn search_tiles<A: Scalar>(
         self,
         tiles: &mut Tiles<'_, '_, A>,
         spectrum: &DesignSvd<f64>,
         roundoff: f64,
-    ) -> Result<Solution<f64>> {
+    ) -> Result<Option<Solution<f64>>> {
         let reason = Reason::LambdaSearch;
         if self.lambda == Lambda::Gcv {
             let lambda = self.by_gcv(spectrum, roundoff);
-            return Ok(ridge_solution(spectrum, reason, &lambda, None));
+            return Ok(Some(ridge_solution(spectrum, reason, &lambda, None)));
         }
         let candidates = distinguishable_lambdas(spectrum);
         let (candidates, scores) = if spectrum.frame.weights_differ() {
@@ -277,9 +265,13 @@ impl Ridge {
             let scores = self.worthwhile_scores(tiles, spectrum, &candidates, roundoff)?;
             (candidates, scores)
         };
+        let Some(scores) = scores else {
+            return Ok(None);
+        };
         let (lambda, errors) =
             self.lambda_and_errors(spectrum, &candidates, &scores, (roundoff, true));
-        Ok(ridge_solution(spectrum, reason, &lambda, Some(errors)))
+        let solution = ridge_solution(spectrum, reason, &lambda, Some(errors));
+        Ok(Some(solution))
     }
 
     /// The answer by the best strength for predictions in arithmetic of this unit roundoff.
@@ -310,7 +302,7 @@ impl Ridge {
         spectrum: &DesignSvd<f64>,
         candidates: &[f64],
         roundoff: f64,
-    ) -> Result<Array2<f64>> {
+    ) -> Result<Option<Array2<f64>>> {
         /// What generalized cross-validation may be off by.
         const MARGIN: f64 = 1.05;
         let rows = spectrum.frame.weighted_rows as f64;
@@ -325,12 +317,15 @@ impl Ridge {
             .rposition(may_be)
             .map_or(0, |last| last + 1);
         if count > 0 {
-            let some =
-                leave_one_out::scores_of_tiles(tiles, spectrum, &candidates[..count], roundoff)?;
+            let some = &candidates[..count];
+            let Some(some) = leave_one_out::scores_of_tiles(tiles, spectrum, some, roundoff)?
+            else {
+                return Ok(None);
+            };
             scores.slice_mut(s![..count, ..]).assign(&some);
             let chosen = self.choose(spectrum, &scores);
             if chosen.iter().all(|&candidate| candidate < count) {
-                return Ok(scores);
+                return Ok(Some(scores));
             }
         }
         leave_one_out::scores_of_tiles(tiles, spectrum, candidates, roundoff)

@@ -209,6 +209,42 @@ fn badly_conditioned_problems_go_by_sums_of_products_where_noise_calls_for_stren
     }
 }
 
+/// As columns of zeros and a one are beside large ones: without ridge the row would determine its own fit.
+#[test]
+fn rows_that_ridge_keeps_from_determining_their_own_fit_are_scored_as_they_are() {
+    for (name, mut hidden) in badly_conditioned() {
+        let size = hidden.mapv(|h| h * h).sum().sqrt();
+        for (row, own) in [(5, 1e-5), (300, 1e-3)] {
+            let mut column = Array2::zeros((hidden.nrows(), 1));
+            column[[row, 0]] = own * size;
+            hidden.append(Axis(1), column.view()).unwrap();
+        }
+        let mut problem = Problem::new(hidden.clone(), 2, 0.0);
+        problem.targets += &(normal(hidden.nrows(), 2, 93) * (0.1 * size));
+        assert_eq!(problem.agrees(name), Route::GramSvd, "{name}");
+    }
+}
+
+/// A few strong directions explain half of the targets, many weaker ones nothing, the weakest the rest.
+#[test]
+fn a_score_that_falls_again_below_what_sums_serve_is_seen() {
+    let (strong, weak) = (6, 66);
+    let size = 3e-6;
+    let mut hidden = normal(1200, 72, 20);
+    let mut rest = hidden.slice_mut(s![.., strong..weak]);
+    rest.mapv_inplace(|h| 2e-4 * h);
+    let mut rest = hidden.slice_mut(s![.., weak..]);
+    rest.mapv_inplace(|h| size * h);
+    let mut truth = Array2::ones((72, 1));
+    truth.slice_mut(s![strong..weak, ..]).fill(0.0);
+    truth.slice_mut(s![weak.., ..]).fill(size.recip());
+    let mut problem = Problem::new(hidden.clone(), 1, 0.0);
+    problem.targets = hidden.dot(&truth) + normal(1200, 1, 21) * 0.1;
+    let lambda = problem.by_matrix(Ridge::default()).diagnosis.lambda[0];
+    assert!(lambda < 1e-11, "{lambda:e}");
+    problem.agrees("falls again");
+}
+
 #[test]
 fn badly_conditioned_problems_of_little_noise_go_by_the_triangle_and_agree() {
     for (name, hidden) in badly_conditioned() {

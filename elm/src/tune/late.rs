@@ -23,27 +23,50 @@ const MARGIN: f64 = 0.02;
 const FEWER: f64 = 0.01;
 /// Neurons that are not halved any more.
 const FEWEST: usize = 50;
+/// What twice the neurons must win by, of the squared error of rows left out, where half cost more than that.
+const MORE: f64 = 0.02;
+/// Rows to a column of the hidden layer below which neurons are not doubled: it takes longest there, and
+/// ridge holds back most of what they could do.
+const ROWS: usize = 2;
 
-/// The fit, and its settings: of half the neurons, and half of these, while that costs little.
+/// The fit, and its settings: of half the neurons, and half of these, while that costs little; of twice,
+/// where half cost much, if that pays, and within `most`, with slopes once more where these paid before.
 pub(super) fn fit<A: Scalar, D: TargetDim>(
     params: ElmParams<A>,
+    most: Option<usize>,
     data: &Dataset<'_, A, D>,
 ) -> Result<(ElmParams<A>, Elm<A, D>)> {
+    let first = params.input_scales().to_vec();
     let (mut params, mut model) = fit_twice(params, data)?;
+    let slopes_paid = params.input_scales() != first;
     let mut least = left_out(&model, data);
-    while params.neurons() >= 2 * FEWEST {
-        let half = params.clone().with_neurons(params.neurons() / 2);
-        let Ok(smaller) = half.fit_dataset(data) else {
-            break;
-        };
-        let error = left_out(&smaller, data);
-        if error.is_nan() || error > (1.0 + FEWER) * least {
-            break;
-        }
+    let with = |params: &ElmParams<A>, neurons: usize| {
+        let params = params.clone().with_neurons(neurons);
+        // Weights that overflow are no better.
+        let model = params.fit_dataset(data).ok()?;
+        let error = left_out(&model, data);
+        Some((params, model, error))
+    };
+    let given = params.neurons();
+    while params.neurons() >= 2 * FEWEST
+        && let Some((half, smaller, error)) = with(&params, params.neurons() / 2)
+        && error <= (1.0 + FEWER) * least
+    {
         least = least.min(error);
         (params, model) = (half, smaller);
     }
-    Ok((params, model))
+    let links = model.beta().nrows() - params.neurons();
+    let room = (data.rows() / ROWS).saturating_sub(links);
+    let more = room.min(2 * given).min(most.unwrap_or(usize::MAX));
+    if params.neurons() < given || 2 * more < 3 * given {
+        return Ok((params, model));
+    }
+    let again = slopes_paid.then(|| with_slopes(&params, &model, data));
+    let settings = again.flatten().unwrap_or_else(|| params.clone());
+    match with(&settings, more) {
+        Some((twice, larger, error)) if error < (1.0 - MORE) * least => Ok((twice, larger)),
+        _ => Ok((params, model)),
+    }
 }
 
 /// Of few rows the search has seen all, and leave-one-out is too kind to slopes.

@@ -32,7 +32,8 @@
 //! weights nor slopes have seen, held to the [bounds](crate::bounds) of the others: one round and
 //! ramps, unless another choice is surely better. Of many rows the fit is made once more with slopes of
 //! its own, and kept where that is better; then neurons are halved while that costs less than a
-//! hundredth of the squared error of rows left out. Where the held-out error is below a tenth of the
+//! hundredth of the squared error of rows left out; where it costs more they are doubled, and that is kept
+//! where it wins two hundredths. Where the held-out error is below a tenth of the
 //! targets' deviation the quick search is made as well, and the fit of the smaller error of rows left
 //! out is kept.
 //!
@@ -106,9 +107,10 @@ pub enum Level {
     /// step, each by exact held-out errors.
     Quick,
     /// Ramps along the inputs, and a scale for each, learned from slopes in rounds whose number is chosen on
-    /// rows that the slopes have not seen. For rows that may be held out one by one: where they have
-    /// [groups](Dataset::with_groups), folds or a [budget](Tuner::with_budget) are asked for, and where rows
-    /// are fewer than 300, the search is that of [`Quick`](Self::Quick).
+    /// rows that the slopes have not seen. For [`auto`](ElmParams::auto) and rows that may be held out one by
+    /// one: where neurons are [given](ElmParams::tuner), rows have [groups](Dataset::with_groups), folds or a
+    /// [budget](Tuner::with_budget) are asked for, and where rows are fewer than 300, the search is that of
+    /// [`Quick`](Self::Quick).
     Full,
 }
 
@@ -157,7 +159,7 @@ pub struct Tuned<A: Scalar, D: TargetDim = Ix2> {
 /// | [`level`](Self::with_level) | quick; for `auto` full, quick for classes | how much the search looks for | |
 /// | [`budget`](Self::with_budget) | 24; 60 for `auto` | factorizations to spend on the quick search | at least 1 |
 /// | [`criterion`](Self::with_criterion) | leave-one-out | the error that is made small | at least 2 folds |
-/// | [`max_neurons`](Self::with_max_neurons) | 1000; fewer above 4000 rows | where doubling ends when the number is not given | at least 1 |
+/// | [`max_neurons`](Self::with_max_neurons) | 1000, fewer above 4000 rows; at the full level twice these where they pay | neurons at most when the number is not given | at least 1 |
 /// | [`search_rows`](Self::with_search_rows) | 2000 | rows that the search looks at, drawn at random | at least 2 |
 /// | [`per_input`](Self::with_per_input) | off; on for `auto` | whether each input gets a scale of its own | |
 #[derive(Debug, Clone, PartialEq)]
@@ -279,7 +281,7 @@ impl<A: Scalar> Tuner<A> {
 
     /// The largest number of neurons that is chosen. Unless it is set, 1000; or, where there are more
     /// than 4000 rows, as many as keep rows times neurons squared, which the final fit's time goes
-    /// by, at 4e9, but at least 200.
+    /// by, at 4e9, but at least 200; at the [full level](Level::Full) up to twice as many where those pay.
     #[must_use]
     pub fn with_max_neurons(mut self, neurons: usize) -> Self {
         self.max_neurons = Some(neurons);
@@ -367,7 +369,7 @@ impl<A: Scalar> Tuner<A> {
             return self.quick_search(data);
         };
         let smooth = choice.best.score < SMOOTH;
-        let (params, model) = late::fit(choice.params, data)?;
+        let (params, model) = late::fit(choice.params, self.max_neurons, data)?;
         let best = Trial {
             neurons: params.neurons(),
             scale: params.scale(),
@@ -419,12 +421,10 @@ impl<A: Scalar> Tuner<A> {
     ) -> Result<Option<full::Choice<A>>> {
         let rows = Rows::new(data)?.x().nrows().min(self.search_rows);
         let exchangeable = data.groups().is_none() && self.criterion == Criterion::LeaveOneOut;
-        let level = self.level.unwrap_or(match self.neurons {
-            None => Level::Full,
-            Some(_) => Level::Quick,
-        });
-        let full = level == Level::Full && self.budget.is_none();
-        if !full || !exchangeable || rows < full::FEWEST_ROWS {
+        let quick = self.level == Some(Level::Quick) || self.budget.is_some();
+        // Neurons of its own kinds are searched for step by step.
+        let given = self.neurons.is_some();
+        if quick || given || !exchangeable || rows < full::FEWEST_ROWS {
             return Ok(None);
         }
         full::search(self, data)
