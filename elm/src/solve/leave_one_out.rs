@@ -180,10 +180,14 @@ pub(super) fn scores_of_tiles<A: Scalar>(
         close: Vec::new(),
     };
     let light = single.then(|| Light::new(spectrum, candidates, lightest));
+    let weak = spectrum.weakest.is_some();
     let seen = &*tiles;
     let score = |part: Range<usize>| {
         let (mut pass, mut memory) = (pass.clone(), seen.memory());
         for range in seen.ranges(part) {
+            if weak && !pass.close.is_empty() {
+                break;
+            }
             let first = range.start;
             let tile = seen.tile(range.clone(), &mean, &mut memory)?;
             let Some(light) = &light else {
@@ -207,7 +211,7 @@ pub(super) fn scores_of_tiles<A: Scalar>(
         pass.scores.sums += &squared_residuals(spectrum, candidates);
     }
     if !pass.close.is_empty() {
-        if spectrum.weakest.is_some() {
+        if weak {
             return Ok(None);
         }
         let close = &pass.close;

@@ -19,54 +19,62 @@ use crate::scalar::Scalar;
 /// used is a little too good.
 const MARGIN: f64 = 0.02;
 
-/// The share of the squared error of rows left out that fewer neurons may cost.
-const FEWER: f64 = 0.01;
+/// What twice the neurons must win by, of the squared error of rows left out, up to the usual number and beyond
+/// it; half of them are taken where they cost no more than the first.
+const MORE: (f64, f64) = (0.01, 0.02);
 /// Neurons that are not halved any more.
 const FEWEST: usize = 50;
-/// What twice the neurons must win by, of the squared error of rows left out, where half cost more than that.
-const MORE: f64 = 0.02;
-/// Rows to a column of the hidden layer below which neurons are not doubled: it takes longest there, and
-/// ridge holds back most of what they could do.
+/// Rows to a column of the hidden layer below which there are not more neurons than usual: fits take longest
+/// there, and ridge holds back most of what more neurons could do.
 const ROWS: usize = 2;
 
-/// The fit, and its settings: of half the neurons, and half of these, while that costs little; of twice,
-/// where half cost much, if that pays, and within `most`, with slopes once more where these paid before.
+/// The fit, and its settings. These come with the usual number of neurons: half of them at first, twice as
+/// many while that pays, up to twice the usual number and within `most`; else half as many while that costs
+/// little.
 pub(super) fn fit<A: Scalar, D: TargetDim>(
     params: ElmParams<A>,
     most: Option<usize>,
     data: &Dataset<'_, A, D>,
 ) -> Result<(ElmParams<A>, Elm<A, D>)> {
-    let first = params.input_scales().to_vec();
-    let (mut params, mut model) = fit_twice(params, data)?;
-    let slopes_paid = params.input_scales() != first;
+    let usual = params.neurons();
+    let few = (usual / 2).max(usual.min(FEWEST));
+    let given = params.input_scales().to_vec();
+    let (mut params, mut model) = fit_twice(params.with_neurons(few), data)?;
+    let slopes_paid = params.input_scales() != given;
     let mut least = left_out(&model, data);
-    let with = |params: &ElmParams<A>, neurons: usize| {
-        let params = params.clone().with_neurons(neurons);
+    let with = |params: ElmParams<A>| {
         // Weights that overflow are no better.
         let model = params.fit_dataset(data).ok()?;
         let error = left_out(&model, data);
         Some((params, model, error))
     };
-    let given = params.neurons();
-    while params.neurons() >= 2 * FEWEST
-        && let Some((half, smaller, error)) = with(&params, params.neurons() / 2)
-        && error <= (1.0 + FEWER) * least
+    let links = model.beta().nrows() - few;
+    let room = (data.rows() / ROWS).saturating_sub(links);
+    let beyond = room.min(2 * usual).min(most.unwrap_or(usize::MAX));
+    for (neurons, margin) in [(usual, MORE.0), (beyond, MORE.1)] {
+        if 2 * neurons < 3 * params.neurons() {
+            break;
+        }
+        let again = slopes_paid.then(|| with_slopes(&params, &model, data));
+        let settings = again.flatten().unwrap_or_else(|| params.clone());
+        match with(settings.with_neurons(neurons)) {
+            Some((twice, larger, error)) if error < (1.0 - margin) * least => {
+                (params, model, least) = (twice, larger, error);
+            }
+            _ => break,
+        }
+    }
+    let grown = params.neurons() > few;
+    while !grown
+        && params.neurons() >= 2 * FEWEST
+        && let half = params.neurons() / 2
+        && let Some((half, smaller, error)) = with(params.clone().with_neurons(half))
+        && error <= (1.0 + MORE.0) * least
     {
         least = least.min(error);
         (params, model) = (half, smaller);
     }
-    let links = model.beta().nrows() - params.neurons();
-    let room = (data.rows() / ROWS).saturating_sub(links);
-    let more = room.min(2 * given).min(most.unwrap_or(usize::MAX));
-    if params.neurons() < given || 2 * more < 3 * given {
-        return Ok((params, model));
-    }
-    let again = slopes_paid.then(|| with_slopes(&params, &model, data));
-    let settings = again.flatten().unwrap_or_else(|| params.clone());
-    match with(&settings, more) {
-        Some((twice, larger, error)) if error < (1.0 - MORE) * least => Ok((twice, larger)),
-        _ => Ok((params, model)),
-    }
+    Ok((params, model))
 }
 
 /// Of few rows the search has seen all, and leave-one-out is too kind to slopes.
@@ -177,4 +185,33 @@ fn slopes_of_many_rows_find_the_input_that_matters() {
     let few = (x.slice(s![..400, ..]), t.slice(s![..400]));
     let data = Dataset::new(&few.0, &few.1).unwrap();
     assert_eq!(fit_twice(params.clone(), &data).unwrap().0, params);
+}
+
+#[test]
+fn neurons_are_doubled_where_that_pays_and_never_beyond_what_is_asked_for() {
+    use crate::activation::Activation;
+    use crate::solve::Ridge;
+    use ndarray::Array2;
+
+    let x = Array2::from_shape_fn((1600, 2), |(row, input)| {
+        (row as f64 * [0.618_034, 0.414_214][input]).fract()
+    });
+    let noise = |row: usize| (row as f64 * 0.732_051).fract() - 0.5;
+    let wave = Array1::from_shape_fn(1600, |row| {
+        (9.0 * x[[row, 0]]).sin() * (11.0 * x[[row, 1]]).cos() + 0.02 * noise(row)
+    });
+    let plane = Array1::from_shape_fn(1600, |row| x[[row, 0]] - x[[row, 1]] + noise(row));
+    let params = ElmParams::new(120)
+        .with_activation(Activation::Tanh)
+        .with_direct_links(true)
+        .with_scale(3.0)
+        .with_solver(Ridge::leave_one_out());
+    let neurons = |t: &Array1<f64>, most| {
+        let data = Dataset::new(&x, t).unwrap();
+        fit(params.clone(), most, &data).unwrap().0.neurons()
+    };
+    assert_eq!(neurons(&wave, None), 240);
+    assert_eq!(neurons(&wave, Some(200)), 200);
+    assert_eq!(neurons(&wave, Some(120)), 120);
+    assert_eq!(neurons(&plane, None), 60);
 }

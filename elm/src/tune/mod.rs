@@ -30,12 +30,12 @@
 //! network before, in rounds. Within a round scale and strength are chosen by generalized
 //! cross-validation; the number of rounds, and whether there are ramps, by errors of rows that neither
 //! weights nor slopes have seen, held to the [bounds](crate::bounds) of the others: one round and
-//! ramps, unless another choice is surely better. Of many rows the fit is made once more with slopes of
-//! its own, and kept where that is better; then neurons are halved while that costs less than a
-//! hundredth of the squared error of rows left out; where it costs more they are doubled, and that is kept
-//! where it wins two hundredths. Where the held-out error is below a tenth of the
-//! targets' deviation the quick search is made as well, and the fit of the smaller error of rows left
-//! out is kept.
+//! ramps, unless another choice is surely better. The fit to all rows begins with half of the usual
+//! neurons, and of many rows is made once more with slopes of its own, and kept where that is better. Neurons
+//! are doubled, up to twice the usual number, where that takes a hundredth off the squared error of rows left
+//! out, beyond the usual number two; else they are halved while that costs no more than one. Where the
+//! held-out error is below a tenth of the targets' deviation the quick search is made as well, and the fit of
+//! the smaller error of rows left out is kept.
 //!
 //! A trial looks at 2000 rows at most. At the quick level nearly all trials of `auto` are of a hundred
 //! neurons, some ten milliseconds each; at most nine are of more.
