@@ -19,8 +19,8 @@ use crate::scalar::Scalar;
 /// used is a little too good.
 const MARGIN: f64 = 0.02;
 
-/// What twice the neurons must win by, of the squared error of rows left out, up to the usual number and beyond
-/// it; half of them are taken where they cost no more than the first.
+/// What twice the neurons must win by, of the squared error of rows left out, up to the usual number and
+/// beyond it; half of them are taken where they cost no more than the first.
 const MORE: (f64, f64) = (0.01, 0.02);
 /// Neurons that are not halved any more.
 const FEWEST: usize = 50;
@@ -63,6 +63,11 @@ pub(super) fn fit<A: Scalar, D: TargetDim>(
             }
             _ => break,
         }
+        if !slopes_paid && neurons == usual {
+            // More neurons have better slopes.
+            (params, model) = once_more(params, model, data);
+            least = left_out(&model, data);
+        }
     }
     let grown = params.neurons() > few;
     while !grown
@@ -77,21 +82,30 @@ pub(super) fn fit<A: Scalar, D: TargetDim>(
     Ok((params, model))
 }
 
-/// Of few rows the search has seen all, and leave-one-out is too kind to slopes.
 fn fit_twice<A: Scalar, D: TargetDim>(
     params: ElmParams<A>,
     data: &Dataset<'_, A, D>,
 ) -> Result<(ElmParams<A>, Elm<A, D>)> {
     let model = params.fit_dataset(data)?;
+    Ok(once_more(params, model, data))
+}
+
+/// With slopes of its own, where that is better. Of few rows the search has seen all, and leave-one-out is
+/// too kind to slopes.
+fn once_more<A: Scalar, D: TargetDim>(
+    params: ElmParams<A>,
+    model: Elm<A, D>,
+    data: &Dataset<'_, A, D>,
+) -> (ElmParams<A>, Elm<A, D>) {
     if data.rows() > FEW_ROWS
         && let Some(again) = with_slopes(&params, &model, data)
         // Weights that overflow are no better.
         && let Ok(other) = again.fit_dataset(data)
         && left_out(&other, data) < (1.0 - MARGIN) * left_out(&model, data)
     {
-        return Ok((again, other));
+        return (again, other);
     }
-    Ok((params, model))
+    (params, model)
 }
 
 /// These settings with scales of columns by the slopes of a network, and weighted sums of the same size.
