@@ -49,6 +49,10 @@ impl Basis {
         let mut axes = Array2::from_shape_fn((outputs.min(channels), channels), |(row, column)| {
             vectors[(column, channels - 1 - row)]
         });
+        // Divide and conquer does not always say that it failed.
+        if !axes.iter().all(|value| value.is_finite()) {
+            return Err(no_axes());
+        }
         for mut axis in axes.rows_mut() {
             let largest = axis
                 .iter()

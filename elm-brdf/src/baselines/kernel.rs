@@ -47,17 +47,23 @@ impl Projected {
         let scale = if scale > 0.0 { scale } else { 1.0 };
         projected.scaled_add(-scale, &tail.basis.dot(&tail.basis.t()));
 
+        let no_vectors = || Error::NoConvergence {
+            what: "the eigenvalue decomposition of a kernel matrix",
+        };
         let slice = projected.as_slice_memory_order().unwrap_or(&[]);
         let eigen = MatRef::from_row_major_slice(slice, rows, rows)
             .self_adjoint_eigen(Side::Lower)
-            .map_err(|_| Error::NoConvergence {
-                what: "the eigenvalue decomposition of a kernel matrix",
-            })?;
+            .map_err(|_| no_vectors())?;
         let (values, vectors) = (eigen.S().column_vector(), eigen.U());
         let kept = rows - tail.basis.ncols();
         // faer's eigenvalues rise.
+        let u = Array2::from_shape_fn((rows, kept), |(i, j)| vectors[(i, rows - 1 - j)]);
+        // Divide and conquer does not always say that it failed.
+        if !u.iter().all(|value| value.is_finite()) {
+            return Err(no_vectors());
+        }
         Ok(Self {
-            u: Array2::from_shape_fn((rows, kept), |(i, j)| vectors[(i, rows - 1 - j)]),
+            u,
             eigenvalues: Array1::from_shape_fn(kept, |j| values[rows - 1 - j].max(0.0)),
             tail,
         })

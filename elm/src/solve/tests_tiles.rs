@@ -225,6 +225,20 @@ fn rows_that_ridge_keeps_from_determining_their_own_fit_are_scored_as_they_are()
     }
 }
 
+#[test]
+fn rows_that_determine_their_own_fit_at_every_strength_are_left_to_the_triangle() {
+    for (name, mut hidden) in badly_conditioned() {
+        let size = hidden.mapv(|h| h * h).sum().sqrt();
+        let mut column = Array2::zeros((hidden.nrows(), 1));
+        column[[800, 0]] = size;
+        hidden.append(Axis(1), column.view()).unwrap();
+        let mut problem = Problem::new(hidden.clone(), 2, 0.0);
+        problem.targets += &(normal(hidden.nrows(), 2, 93) * (0.1 * size));
+        let route = problem.by_tiles(Ridge::default()).diagnosis.route;
+        assert_eq!(route, Route::QrSvd, "{name}");
+    }
+}
+
 /// A few strong directions explain half of the targets, many weaker ones nothing, the weakest the rest.
 #[test]
 fn a_score_that_falls_again_below_what_sums_serve_is_seen() {

@@ -24,8 +24,8 @@ const MARGIN: f64 = 0.02;
 const MORE: (f64, f64) = (0.01, 0.02);
 /// Neurons that are not halved any more.
 const FEWEST: usize = 50;
-/// Rows to a column of the hidden layer below which there are not more neurons than usual: fits take longest
-/// there, and ridge holds back most of what more neurons could do.
+/// Rows to a column of the hidden layer below which there are not more neurons than usual: they take long there
+/// and win little.
 const ROWS: usize = 2;
 
 /// The fit, and its settings. These come with the usual number of neurons: half of them at first, twice as
@@ -82,6 +82,7 @@ pub(super) fn fit<A: Scalar, D: TargetDim>(
     Ok((params, model))
 }
 
+/// Once with the scales given, and [once more](once_more).
 fn fit_twice<A: Scalar, D: TargetDim>(
     params: ElmParams<A>,
     data: &Dataset<'_, A, D>,
