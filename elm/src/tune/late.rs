@@ -24,8 +24,8 @@ const MARGIN: f64 = 0.02;
 const MORE: (f64, f64) = (0.01, 0.02);
 /// Neurons that are not halved any more.
 const FEWEST: usize = 50;
-/// Rows to a column of the hidden layer below which there are not more neurons than usual: they take long there
-/// and win little.
+/// Rows to a column of the hidden layer below which there are not more neurons than usual: they take long
+/// there and win little.
 const ROWS: usize = 2;
 
 /// The fit, and its settings. These come with the usual number of neurons: half of them at first, twice as

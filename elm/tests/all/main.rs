@@ -6,6 +6,7 @@
 
 mod accumulate;
 mod accumulate_deficient;
+mod accumulate_states;
 mod bad_input;
 mod bounds;
 mod classify;
