@@ -25,10 +25,21 @@ mod sealed {
     use crate::simd::Coefficients;
 
     /// What the library itself asks of a scalar.
-    pub trait Sealed: Backend + Coefficients + Stored {}
+    pub trait Sealed: Backend + Coefficients + Stored {
+        /// These values, where this type is `f64`.
+        fn of_wide(values: &mut [f64]) -> Option<&mut [Self]>;
+    }
 
-    impl Sealed for f32 {}
-    impl Sealed for f64 {}
+    impl Sealed for f32 {
+        fn of_wide(_: &mut [f64]) -> Option<&mut [Self]> {
+            None
+        }
+    }
+    impl Sealed for f64 {
+        fn of_wide(values: &mut [f64]) -> Option<&mut [Self]> {
+            Some(values)
+        }
+    }
 
     #[cfg(feature = "serde")]
     pub trait Stored: serde::Serialize + serde::de::DeserializeOwned {}

@@ -4,7 +4,10 @@
 //! Work goes to rayon's current pool: all cores, unless the program says otherwise or calls from a pool of
 //! its own (`pool.install(|| params.fit(&x, &t))`). Small problems stay on the thread that asks.
 
+use ndarray::Array2;
+
 use crate::error::{Error, Result};
+use crate::scalar::Scalar;
 
 /// Multiplications below which a part is not worth handing to another thread.
 pub(crate) const WORTHWHILE: usize = 1 << 20;
@@ -151,6 +154,47 @@ pub(crate) fn reduce<I: Send, R: Send>(
         items
             .into_iter()
             .try_for_each(|item| work(item).map(&mut add))?;
+    }
+    Ok(all)
+}
+
+/// The sum of what `work` adds to zeros for each item, in their order; nothing of none. Items on one thread
+/// share working memory and, where there is one thread, room for what is added: new pages for every item
+/// would take longer than small sums.
+///
+/// # Errors
+/// The first of `work`.
+pub(crate) fn sum<I: Send, S, A: Scalar>(
+    items: Vec<I>,
+    zeros: impl Fn() -> Array2<A> + Sync,
+    memory: impl Fn() -> S + Sync,
+    work: impl Fn(&mut S, I, &mut Array2<A>) -> Result<()> + Sync,
+) -> Result<Option<Array2<A>>> {
+    let mut all: Option<Array2<A>> = None;
+    if current_threads() > 1 {
+        let sum_of = |memory: &mut S, item| {
+            let mut sum = zeros();
+            work(memory, item, &mut sum).map(|()| sum)
+        };
+        for part in map_with(items, memory, sum_of) {
+            let part = part?;
+            match &mut all {
+                Some(all) => *all += &part,
+                none => *none = Some(part),
+            }
+        }
+        return Ok(all);
+    }
+    let (mut memory, mut part) = (memory(), None);
+    for item in items {
+        let Some(all) = &mut all else {
+            work(&mut memory, item, all.insert(zeros()))?;
+            continue;
+        };
+        let part = part.get_or_insert_with(&zeros);
+        part.fill(A::zero());
+        work(&mut memory, item, part)?;
+        *all += &*part;
     }
     Ok(all)
 }

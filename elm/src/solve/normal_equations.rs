@@ -248,21 +248,23 @@ impl<A: Scalar> NormalEquations<A> {
             }
             shift = center_of(&sample, width, &Array1::from(roots));
         }
-        let sums_of = |part: Range<usize>| {
-            let mut tile = vec![A::zero(); tile_rows * width];
-            let mut sums = Array2::zeros((width, width).f());
-            let (mut buffers, mut scratch) = (source.hidden.buffers(), Vec::new());
+        let zeros = || Array2::zeros((width, width).f());
+        let memory = || {
+            let tile = vec![A::zero(); tile_rows * width];
+            (tile, source.hidden.buffers(), Vec::new())
+        };
+        let sums = threads::sum(source.parts(), zeros, memory, |memory, part, sums| {
+            let (tile, buffers, scratch) = memory;
             for range in runs(part, tile_rows) {
                 let tile = &mut tile[..range.len() * width];
-                source.write(range, (&frame, &shift), tile, &mut buffers)?;
+                source.write(range, (&frame, &shift), tile, buffers)?;
                 if let Ok(tile) = ArrayView2::from_shape((tile.len() / width, width), tile) {
-                    A::add_gram(tile, &mut sums, &mut scratch);
+                    A::add_gram(tile, sums, scratch);
                 }
             }
-            Ok(sums)
-        };
-        let sums = threads::reduce(source.parts(), sums_of, |sums, part| *sums += &part)?;
-        let sums = sums.unwrap_or_else(|| Array2::zeros((width, width).f()));
+            Ok(())
+        })?;
+        let sums = sums.unwrap_or_else(zeros);
         Ok(Self::of_sums(&sums, frame, shift))
     }
 

@@ -1,8 +1,6 @@
 //! Singular values of many rows from their sums of products: half the arithmetic of a triangle, for problems
 //! whose condition, or whose strength of ridge, leaves these their digits.
 
-use std::ops::Range;
-
 use ndarray::{Array2, Axis, ShapeBuilder, s};
 
 use super::Route;
@@ -85,19 +83,18 @@ impl<A: Scalar> Tiles<'_, '_, A> {
         }
         let width = self.source.width();
         let rows = &*self;
-        let sums_of = |part: Range<usize>| {
-            let mut sums = Array2::zeros((width, width).f());
-            let (mut memory, mut scratch) = (rows.memory(), Vec::new());
+        let zeros = || Array2::zeros((width, width).f());
+        let memory = || (rows.memory(), Vec::new());
+        let sums = threads::sum(self.parts(), zeros, memory, |memory, part, sums| {
+            let (memory, scratch) = memory;
             for range in rows.ranges(part) {
                 if !rows.is_empty(range.clone()) {
-                    let tile = rows.tile(range, &rows.shift, &mut memory)?;
-                    f64::add_gram(tile, &mut sums, &mut scratch);
+                    f64::add_gram(rows.tile(range, &rows.shift, memory)?, sums, scratch);
                 }
             }
-            Ok(sums)
-        };
-        let sums = threads::reduce(self.parts(), sums_of, |sums, part| *sums += &part)?;
-        let sums = sums.unwrap_or_else(|| Array2::zeros((width, width).f()));
+            Ok(())
+        })?;
+        let sums = sums.unwrap_or_else(zeros);
         let moments = NormalEquations::of_sums(&sums, self.frame.clone(), self.shift.clone());
         if !moments.in_range() {
             return Ok(None);

@@ -160,29 +160,39 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
             narrow,
             wide,
         } = memory;
-        narrow.resize(rows.len() * neurons, A::zero());
         if wide.nrows() < rows.len() {
             *wide = Array2::zeros((rows.len(), width));
         }
-        let none = vec![A::zero(); neurons];
-        let scale = A::from_f64(self.frame.hidden_scale);
-        let to = (narrow.as_mut_slice(), neurons);
-        self.source
-            .hidden
-            .write(rows.clone(), (scale, &none), to, buffers)?;
+        let lines = wide.as_slice_mut().unwrap_or(&mut []);
         let (hidden_shift, target_shift) = shift.split_at(neurons);
+        let scale = A::from_f64(self.frame.hidden_scale);
+        let hidden = &self.source.hidden;
+        if let Some(to) = A::of_wide(lines) {
+            let shift: Vec<A> = hidden_shift
+                .iter()
+                .map(|&shift| A::from_f64(shift))
+                .collect();
+            hidden.write(rows.clone(), (scale, &shift), (to, width), buffers)?;
+        } else {
+            narrow.resize(rows.len() * neurons, A::zero());
+            let none = vec![A::zero(); neurons];
+            hidden.write(rows.clone(), (scale, &none), (narrow, neurons), buffers)?;
+            for (to, hidden) in lines
+                .chunks_exact_mut(width)
+                .zip(narrow.chunks_exact(neurons))
+            {
+                for ((to, value), shift) in to.iter_mut().zip(hidden).zip(hidden_shift) {
+                    *to = value.as_f64() - shift;
+                }
+            }
+        }
         let targets = self.source.targets.slice(s![rows.clone(), ..]);
         let roots = self.frame.root_weights.slice(s![rows.clone()]);
-        let lines = wide.as_slice_mut().unwrap_or(&mut []);
         let lines = lines.chunks_exact_mut(width);
-        let values = narrow.chunks_exact(neurons).zip(targets.rows());
-        for ((to, (hidden, targets)), &root) in lines.zip(values).zip(roots) {
+        for ((to, targets), &root) in lines.zip(targets.rows()).zip(roots) {
             if root == 0.0 {
                 to.fill(0.0);
                 continue;
-            }
-            for ((to, value), shift) in to.iter_mut().zip(hidden).zip(hidden_shift) {
-                *to = value.as_f64() - shift;
             }
             let rest = &mut to[neurons..];
             for (((to, target), &scale), shift) in rest
