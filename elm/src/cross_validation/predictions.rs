@@ -6,7 +6,7 @@ use ndarray::{Array1, Array2, ArrayView, ArrayView2, Axis, Ix2};
 
 use crate::dataset::{TargetDim, per_output};
 use crate::scalar::Scalar;
-use crate::solve::Ridge;
+use crate::solve::lambda_grid::last_within;
 
 /// Predictions for rows by fits that have not seen them; made by
 /// [`ElmParams::cross_val_predict`](crate::ElmParams::cross_val_predict) and by
@@ -116,14 +116,14 @@ impl LambdaPath {
         self.rmse
             .columns()
             .into_iter()
-            .map(|scores| self.lambdas[Ridge::last_within(scores, EQUAL)])
+            .map(|scores| self.lambdas[last_within(scores, EQUAL)])
             .collect()
     }
 
     /// For each output, or for all together, the strongest whose error exceeds the smallest by no more than
     /// this share.
     pub(super) fn strongest(&self, shared: bool, tolerance: f64) -> Vec<f64> {
-        let strength = |scores| self.lambdas[Ridge::last_within(scores, tolerance)];
+        let strength = |scores| self.lambdas[last_within(scores, tolerance)];
         if !shared {
             return self.rmse.columns().into_iter().map(strength).collect();
         }
@@ -137,6 +137,6 @@ impl LambdaPath {
     #[must_use]
     pub fn best_shared(&self) -> f64 {
         let relative = &self.rmse / &self.scale;
-        self.lambdas[Ridge::last_within(relative.mapv(|r| r * r).sum_axis(Axis(1)).view(), EQUAL)]
+        self.lambdas[last_within(relative.mapv(|r| r * r).sum_axis(Axis(1)).view(), EQUAL)]
     }
 }

@@ -127,7 +127,7 @@ impl<A: Scalar> ElmParams<A> {
             None => {
                 let design = Self::design(x, &map)?;
                 let problem = self.problem(&design, t, weights.as_ref())?;
-                self.solver.solve(&problem)?
+                self.solver.solve_whole(&problem)?
             }
         };
         Ok(Elm::assemble(map, solution, bounds))

@@ -50,6 +50,8 @@ pub(crate) struct DesignSvdWithRows<A: Scalar> {
     pub(crate) one_minus_leverage: Array1<A>,
     /// The unit vector of the intercept; 0 without one.
     pub(crate) constant: Array1<A>,
+    /// Rows whose residual is a difference, and what rounding may make of it for each output.
+    pub(super) doubtful: Vec<(usize, Vec<A>)>,
 }
 
 impl<A: Scalar> DesignSvd<A> {
@@ -268,6 +270,13 @@ impl<A: Scalar> DesignSvd<A> {
         squares(self.c.view()) + &self.residual_ss
     }
 
+    /// The means of hidden values and targets, in units of their scale.
+    pub(super) fn means(&self) -> Vec<A> {
+        let hidden = &self.frame.hidden_mean / self.frame.hidden_scale;
+        let targets = &self.frame.target_mean / &self.frame.target_scale;
+        hidden.iter().chain(&targets).copied().collect()
+    }
+
     /// The sum of the row weights, the largest being 1.
     pub(crate) fn total_weight(&self) -> f64 {
         self.frame.total_weight.as_f64()
@@ -328,11 +337,12 @@ impl<A: Scalar> DesignSvdWithRows<A> {
                 frame,
             },
             constant,
+            doubtful: Vec::new(),
             u,
         };
         if !spanned {
-            rows.residual = rows.off_span(targets);
-            rows.measure_freedom();
+            rows.residual = rows.off_span(targets.clone());
+            rows.measure_freedom(targets.view());
             rows.spectrum.residual_ss = squares(rows.residual.view());
         }
         Ok(rows)
@@ -354,7 +364,7 @@ impl<A: Scalar> DesignSvdWithRows<A> {
 
     /// Fills [`one_minus_leverage`](Self::one_minus_leverage), and mends [`residual`](Self::residual) where
     /// it is small because the row determines its own fit.
-    fn measure_freedom(&mut self) {
+    fn measure_freedom(&mut self, targets: ArrayView2<'_, A>) {
         let u = &self.u;
         self.one_minus_leverage = Array1::from_shape_fn(u.nrows(), |i| {
             A::one() - self.constant[i].powi(2) - u.row(i).dot(&u.row(i))
@@ -373,19 +383,52 @@ impl<A: Scalar> DesignSvdWithRows<A> {
                 units[[row, column]] = A::one();
             }
             let left = self.off_span(units);
-            let mended = A::product(left.t(), self.residual.view());
+            let mut mended = A::product(left.t(), self.residual.view());
             for (column, &row) in block.iter().enumerate() {
                 let own = left.column(column);
                 let own = own.dot(&own);
-                if own.sqrt() <= noise {
-                    self.one_minus_leverage[row] = A::zero();
-                    self.residual.row_mut(row).fill(A::zero());
-                } else {
-                    self.one_minus_leverage[row] = own;
-                    self.residual.row_mut(row).assign(&mended.row(column));
+                let alone = own.sqrt() <= noise;
+                self.one_minus_leverage[row] = if alone { A::zero() } else { own };
+                if alone {
+                    mended.row_mut(column).fill(A::zero());
+                }
+                let difference: Vec<_> = self.difference(row, targets.row(row)).collect();
+                let mut own = self.residual.row_mut(row);
+                own.assign(&mended.row(column));
+                // More than rounding: errors of the row's coordinates in weak directions, which a strength
+                // holds back. They cancel in the difference.
+                if own
+                    .iter()
+                    .zip(&difference)
+                    .any(|(own, (raw, rounding))| (*raw - *own).abs() > *rounding)
+                {
+                    own.iter_mut()
+                        .zip(&difference)
+                        .for_each(|(own, (raw, _))| *own = *raw);
+                    let rounding = difference.into_iter().map(|(_, rounding)| rounding);
+                    self.doubtful.push((row, rounding.collect()));
                 }
             }
         }
+    }
+
+    /// The targets of a row less their part in the span, and what rounding may make of that difference.
+    fn difference<'a>(
+        &'a self,
+        row: usize,
+        targets: ArrayView1<'a, A>,
+    ) -> impl Iterator<Item = (A, A)> + 'a {
+        let u = self.u.row(row);
+        let columns = self.spectrum.c.columns().into_iter();
+        columns.zip(targets).map(move |(c, &target)| {
+            let mut size = target.abs();
+            let mut left = target;
+            for (&u, &c) in u.iter().zip(c) {
+                left -= u * c;
+                size += (u * c).abs();
+            }
+            (left, size * self.spectrum.level())
+        })
     }
 }
 

@@ -30,7 +30,7 @@ pub enum Route {
     /// QR, then back substitution.
     Qr,
     /// Singular values from $H^T H$, whose condition, or the strength of ridge that was found, bounds the
-    /// relative error that this leaves by 1e-8: for at least four rows to a neuron, which are made as they
+    /// relative error that this leaves by 1e-8: for at least two rows to a neuron, which are made as they
     /// are needed.
     GramSvd,
 }

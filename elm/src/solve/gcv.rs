@@ -2,9 +2,8 @@
 
 use ndarray::{Array2, Zip};
 
-use super::Ridge;
 use super::design_svd::DesignSvd;
-use super::lambda_grid::all_distinguishable_lambdas;
+use super::lambda_grid::{FLAT, all_distinguishable_lambdas, last_within};
 use super::leave_one_out::NEGLIGIBLE;
 use crate::scalar::Scalar;
 
@@ -48,5 +47,5 @@ pub(super) fn serves(spectrum: &DesignSvd<f64>, roundoff: f64) -> bool {
     let first = candidates.partition_point(|strength| *strength < weakest);
     let scores = gcv_scores(spectrum, &candidates, roundoff);
     let mut columns = scores.columns().into_iter();
-    columns.all(|scores| Ridge::last_within(scores, 0.0) >= first + ABOVE)
+    columns.all(|scores| last_within(scores, FLAT) >= first + ABOVE)
 }

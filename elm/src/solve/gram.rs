@@ -15,6 +15,7 @@ use ndarray::{Array1, Array2};
 use super::Solution;
 use super::diagnosis::{Diagnosis, Reason, Route};
 use super::equilibration::{EquilibratedProblem, Equilibration};
+use super::lambda_grid::FLAT;
 use super::lanczos::largest_eigenvalue;
 use super::normal_equations::{NormalEquations, RowSource};
 use super::norms::norm;
@@ -47,6 +48,15 @@ pub(super) fn weakest() -> f64 {
     f64::EPSILON / accuracy::<f64>()
 }
 
+/// The weakest strength that a search by sums of products chooses where this share of the targets' squares is
+/// left: residuals are off by $\epsilon / \lambda$ of the targets, which is to be a ten thousandth of them at
+/// most. From 1e-10 on one step of refinement makes output weights as accurate as this route's.
+pub(super) fn weakest_searched(share: f64) -> f64 {
+    (1e4 * f64::EPSILON / share.sqrt()).max(SEARCHED)
+}
+
+const SEARCHED: f64 = 1e-10;
+
 /// Sums of products of centered rows.
 pub(super) struct Sums {
     /// $H^T H$, the lower half.
@@ -58,8 +68,9 @@ pub(super) struct Sums {
     pub(super) rows: f64,
 }
 
-/// Whether generalized cross-validation calls for a strength that is [`allowed`], for every output, as far
-/// as these sums tell: whether its score rises from ten times the weakest such strength to that one.
+/// Whether generalized cross-validation calls for a strength that a search may choose, for every output, as
+/// far as these sums tell: whether its score does not fall from ten times the weakest such strength to that
+/// one.
 pub(super) fn holds_back(sums: &Sums) -> bool {
     let Sums {
         products,
@@ -87,12 +98,12 @@ pub(super) fn holds_back(sums: &Sums) -> bool {
             .all(|(left, all)| *left > UNEXPLAINED * all);
         known.then(|| left / (free * free))
     };
-    let (Some(weak), Some(stronger)) = (score(weakest()), score(10.0 * weakest())) else {
+    let (Some(weak), Some(stronger)) = (score(SEARCHED), score(10.0 * SEARCHED)) else {
         return false;
     };
     weak.iter()
         .zip(&stronger)
-        .all(|(weak, stronger)| weak > stronger)
+        .all(|(weak, stronger)| *weak * (1.0 + FLAT) > *stronger)
 }
 
 /// $\lVert T - H x \rVert^2$ of each output from $H^T H$, $H^T T$ and $\lVert T \rVert^2$.

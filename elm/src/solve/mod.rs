@@ -25,6 +25,7 @@
 
 pub(crate) mod beside;
 mod cholesky;
+mod close_rows;
 pub(crate) mod design_svd;
 mod diagnosis;
 pub(crate) mod equilibration;
@@ -34,6 +35,8 @@ mod inverse;
 pub(crate) mod lambda_grid;
 pub(crate) mod lanczos;
 mod leave_one_out;
+mod left_out_tiles;
+mod many_rows;
 #[cfg(feature = "serde")]
 mod named;
 pub(crate) mod normal_equations;
@@ -244,14 +247,36 @@ impl Solver {
     /// [`Error::Singular`] and [`Error::Conflict`] from [`Inverse`]; [`Error::Overflow`] when the
     /// answer does not fit the type; [`Error::NoConvergence`] from the factorization.
     pub fn solve<A: Scalar>(&self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
+        self.solve_present(problem, |problem| {
+            match self.solve_rows(&problem.row_source())? {
+                Some(solution) => Ok(solution),
+                None => self.solve_matrix(problem),
+            }
+        })
+    }
+
+    /// As [`solve`](Self::solve), for a problem of which [`solve_rows`](Self::solve_rows) has made nothing.
+    pub(crate) fn solve_whole<A: Scalar>(
+        &self,
+        problem: &LeastSquares<'_, A>,
+    ) -> Result<Solution<A>> {
+        self.solve_present(problem, |problem| self.solve_matrix(problem))
+    }
+
+    /// Solves without the rows of weight 0.
+    fn solve_present<A: Scalar>(
+        &self,
+        problem: &LeastSquares<'_, A>,
+        solve: impl Fn(&LeastSquares<'_, A>) -> Result<Solution<A>>,
+    ) -> Result<Solution<A>> {
         self.check()?;
         let Some(rows) = problem.weights.and_then(present) else {
-            return self.solve_all(problem);
+            return solve(problem);
         };
         let hidden = problem.hidden.select(Axis(0), &rows);
         let targets = problem.targets.select(Axis(0), &rows);
         let weights = problem.weights.map(|w| w.select(Axis(0), &rows));
-        self.solve_all(&LeastSquares {
+        solve(&LeastSquares {
             hidden: hidden.view(),
             targets: targets.view(),
             weights: weights.as_ref().map(|weights| weights.view()),
@@ -259,12 +284,11 @@ impl Solver {
         })
     }
 
-    /// Solves a problem that has no rows of weight 0.
-    fn solve_all<A: Scalar>(&self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
+    fn solve_matrix<A: Scalar>(&self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
         in_range(match self {
             Self::Inverse(solver) => solver.solve(problem),
-            Self::PseudoInverse(solver) => solver.solve(problem),
-            Self::Ridge(solver) => solver.solve(problem),
+            Self::PseudoInverse(solver) => solver.solve_matrix(problem),
+            Self::Ridge(solver) => solver.solve_matrix(problem),
         }?)
     }
 

@@ -119,22 +119,24 @@ impl<A: Scalar> Tiles<'_, '_, A> {
         };
         // With the correction c errors are as if the condition were (1 + c / s_1^2) times as large.
         let larger = 1.0 + moments.correction / largest;
-        let mut weakest = None;
-        if !gram::allowed::<f64>(smallest / largest / larger) {
+        let conditioned = gram::allowed::<f64>(smallest / largest / larger);
+        if !conditioned {
             // What ridge keeps of a direction is s^2 / (s^2 + l), so that an error of epsilon in the weakest
             // s^2 is one of epsilon / l in that; of those below epsilon all digits are lost.
             let known = s.iter().filter(|s| **s > f64::EPSILON * largest).count();
             s = s.slice(s![..known]).to_owned();
             vt = vt.slice(s![..known, ..]).to_owned();
-            weakest = Some(gram::weakest() * larger);
         }
         let s = s.mapv_into(f64::sqrt);
         let c = f64::product(vt.view(), moments.right.view()) / s.view().insert_axis(Axis(1));
         let residual_ss = &moments.squares - &squares(c.view());
-        let explained = |(&left, &all): (&f64, &f64)| all > 0.0 && left < gram::UNEXPLAINED * all;
-        if residual_ss.iter().zip(&moments.squares).any(explained) {
+        let share = residual_ss.iter().zip(&moments.squares);
+        let share = share.filter(|(_, all)| **all > 0.0);
+        let share = share.fold(1.0, |least: f64, (left, all)| least.min(left / all));
+        if share < gram::UNEXPLAINED {
             return Ok(None);
         }
+        let weakest = (!conditioned).then(|| gram::weakest_searched(share) * larger);
         let frame = moments.frame;
         let mean = &frame.hidden_mean / frame.hidden_scale;
         let lengths = &gram.diag() + &mean.mapv_into(|m| m * m * frame.total_weight);

@@ -77,10 +77,11 @@ impl PseudoInverse {
         }
     }
 
-    pub(super) fn solve<A: Scalar>(self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
-        if let Some(solution) = self.solve_rows(&problem.row_source())? {
-            return Ok(solution);
-        }
+    /// The answer from the whole matrix.
+    pub(super) fn solve_matrix<A: Scalar>(
+        self,
+        problem: &LeastSquares<'_, A>,
+    ) -> Result<Solution<A>> {
         let prepared = EquilibratedProblem::new(problem);
         let (hidden, targets) = (prepared.hidden.view(), prepared.targets.view());
         if hidden.nrows() < hidden.ncols() {

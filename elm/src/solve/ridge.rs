@@ -1,14 +1,16 @@
 //! Regularized least squares: $\beta = \arg\min \lVert H\beta - T\rVert^2 + \lambda
 //! s_1^2 \lVert\beta\rVert^2$.
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, s};
+use ndarray::{Array1, Array2, ArrayView2, Axis};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use super::design_svd::{DesignSvd, DesignSvdWithRows};
 use super::equilibration::EquilibratedProblem;
-use super::gcv::{gcv_scores, serves};
-use super::lambda_grid::{FIRST_STEP, distinguishable_lambdas, grid, strength};
+use super::gcv::gcv_scores;
+use super::lambda_grid::{
+    FIRST_STEP, TOLERANCE, distinguishable_lambdas, grid, last_within, strength,
+};
 use super::leave_one_out;
 use super::normal_equations::RowSource;
 use super::tiles::{Threshold, Tiles};
@@ -148,10 +150,11 @@ impl Ridge {
         }
     }
 
-    pub(super) fn solve<A: Scalar>(self, problem: &LeastSquares<'_, A>) -> Result<Solution<A>> {
-        if let Some(solution) = self.solve_rows(&problem.row_source())? {
-            return Ok(solution);
-        }
+    /// The answer from the whole matrix.
+    pub(super) fn solve_matrix<A: Scalar>(
+        self,
+        problem: &LeastSquares<'_, A>,
+    ) -> Result<Solution<A>> {
         match self.lambda {
             Lambda::Relative(lambda) => {
                 let prepared = EquilibratedProblem::new(problem);
@@ -179,7 +182,7 @@ impl Ridge {
 
     /// The answer from rows that need not stand in memory together: where a given strength allows
     /// the normal equations and there are at least as many rows as neurons; where there are many more
-    /// rows than neurons; and for a search with at least four rows to a neuron where the condition, or the
+    /// rows than neurons; and for a search with at least two rows to a neuron where the condition, or the
     /// strength that is found, allows sums of products.
     pub(super) fn solve_rows<A: Scalar>(
         self,
@@ -219,61 +222,6 @@ impl Ridge {
         }
     }
 
-    /// As [`search`](Self::search), for many rows: by sums of products, or nothing where these are not good
-    /// enough, unless the `triangle` may be made.
-    pub(super) fn search_many<A: Scalar>(
-        self,
-        tiles: &mut Tiles<'_, '_, A>,
-        triangle: bool,
-        roundoff: f64,
-    ) -> Result<Option<Solution<f64>>> {
-        if let Some(spectrum) = tiles.spectrum_of_products()?
-            && serves(&spectrum, roundoff)
-            && let Some(solution) = self.search_tiles(tiles, &spectrum, roundoff)?
-        {
-            return Ok(Some(solution));
-        }
-        if !triangle {
-            return Ok(None);
-        }
-        let Some(spectrum) = tiles.spectrum_of_triangle()? else {
-            return Ok(None);
-        };
-        self.search_tiles(tiles, &spectrum, roundoff)
-    }
-
-    /// As [`search`](Self::search), for many rows of this spectrum; or nothing where it does not serve these.
-    fn search_tiles<A: Scalar>(
-        self,
-        tiles: &mut Tiles<'_, '_, A>,
-        spectrum: &DesignSvd<f64>,
-        roundoff: f64,
-    ) -> Result<Option<Solution<f64>>> {
-        let reason = Reason::LambdaSearch;
-        if self.lambda == Lambda::Gcv {
-            let lambda = self.by_gcv(spectrum, roundoff);
-            return Ok(Some(ridge_solution(spectrum, reason, &lambda, None)));
-        }
-        let candidates = distinguishable_lambdas(spectrum);
-        let (candidates, scores) = if spectrum.frame.weights_differ() {
-            let mut lambda = self.by_gcv(spectrum, roundoff);
-            lambda.sort_by(f64::total_cmp);
-            lambda.dedup();
-            let scores = leave_one_out::scores_of_tiles(tiles, spectrum, &lambda, roundoff)?;
-            (lambda, scores)
-        } else {
-            let scores = self.worthwhile_scores(tiles, spectrum, &candidates, roundoff)?;
-            (candidates, scores)
-        };
-        let Some(scores) = scores else {
-            return Ok(None);
-        };
-        let (lambda, errors) =
-            self.lambda_and_errors(spectrum, &candidates, &scores, (roundoff, true));
-        let solution = ridge_solution(spectrum, reason, &lambda, Some(errors));
-        Ok(Some(solution))
-    }
-
     /// The answer by the best strength for predictions in arithmetic of this unit roundoff.
     pub(super) fn search(
         self,
@@ -291,44 +239,6 @@ impl Ridge {
         // Without its only row a problem has nothing to place an intercept by.
         let errors = rows.spectrum.can_lose_a_row().then_some(errors);
         Ok(ridge_solution(&rows.spectrum, reason, &lambda, errors))
-    }
-
-    /// Leave-one-out scores of the candidates that may be chosen, and for the others, which hold too
-    /// much back, their squared residuals: scores are not below those, so that it is known afterwards
-    /// whether one of them might have been chosen. Then all are scored.
-    fn worthwhile_scores<A: Scalar>(
-        self,
-        tiles: &mut Tiles<'_, '_, A>,
-        spectrum: &DesignSvd<f64>,
-        candidates: &[f64],
-        roundoff: f64,
-    ) -> Result<Option<Array2<f64>>> {
-        /// What generalized cross-validation may be off by.
-        const MARGIN: f64 = 1.05;
-        let rows = spectrum.frame.weighted_rows as f64;
-        let expected = gcv_scores(spectrum, candidates, roundoff) * (rows * rows);
-        let mut scores = leave_one_out::squared_residuals(spectrum, candidates);
-        let least = expected.fold_axis(Axis(0), f64::INFINITY, |least, score| least.min(*score));
-        let bound = least * MARGIN;
-        let may_be = |row: ArrayView1<'_, f64>| row.iter().zip(&bound).any(|(r, b)| r <= b);
-        // Squared residuals rise with the strength.
-        let count = scores
-            .axis_iter(Axis(0))
-            .rposition(may_be)
-            .map_or(0, |last| last + 1);
-        if count > 0 {
-            let some = &candidates[..count];
-            let Some(some) = leave_one_out::scores_of_tiles(tiles, spectrum, some, roundoff)?
-            else {
-                return Ok(None);
-            };
-            scores.slice_mut(s![..count, ..]).assign(&some);
-            let chosen = self.choose(spectrum, &scores);
-            if chosen.iter().all(|&candidate| candidate < count) {
-                return Ok(Some(scores));
-            }
-        }
-        leave_one_out::scores_of_tiles(tiles, spectrum, candidates, roundoff)
     }
 
     /// Solves without the rows, from which leave-one-out would choose: by generalized
@@ -369,7 +279,7 @@ impl Ridge {
         }
     }
 
-    fn by_gcv<A: Scalar>(self, spectrum: &DesignSvd<A>, roundoff: f64) -> Vec<f64> {
+    pub(super) fn by_gcv<A: Scalar>(self, spectrum: &DesignSvd<A>, roundoff: f64) -> Vec<f64> {
         let candidates = distinguishable_lambdas(spectrum);
         let scores = gcv_scores(spectrum, &candidates, roundoff);
         let chosen = self.choose(spectrum, &scores);
@@ -388,7 +298,7 @@ impl Ridge {
     }
 
     /// The best candidate of each output, and the root of its mean score.
-    fn lambda_and_errors<A: Scalar>(
+    pub(super) fn lambda_and_errors<A: Scalar>(
         self,
         spectrum: &DesignSvd<A>,
         candidates: &[f64],
@@ -416,37 +326,25 @@ impl Ridge {
             .unzip()
     }
 
-    /// The index of the last score that exceeds the smallest finite one by no more than this share.
-    pub(crate) fn last_within(scores: ArrayView1<'_, f64>, tolerance: f64) -> usize {
-        let smallest = scores.iter().copied().fold(f64::INFINITY, f64::min);
-        let bound = smallest * (1.0 + tolerance);
-        scores
-            .iter()
-            .rposition(|&score| score <= bound)
-            .unwrap_or(scores.len() - 1)
-    }
-
     /// For each output the index of the strongest candidate that is as good as the best, to within
     /// [`TOLERANCE`], so that a flat score never means an unregularized fit.
-    fn choose<A: Scalar>(self, spectrum: &DesignSvd<A>, scores: &Array2<f64>) -> Vec<usize> {
+    pub(super) fn choose<A: Scalar>(
+        self,
+        spectrum: &DesignSvd<A>,
+        scores: &Array2<f64>,
+    ) -> Vec<usize> {
         let outputs = scores.ncols();
         if !self.shared {
-            let strongest = |scores| Self::last_within(scores, TOLERANCE);
+            let strongest = |scores| last_within(scores, TOLERANCE);
             return scores.columns().into_iter().map(strongest).collect();
         }
         let variance = spectrum
             .total_squares()
             .mapv(|v| if v > A::zero() { v.as_f64() } else { 1.0 });
         let mean = (scores / &variance).sum_axis(Axis(1));
-        vec![Self::last_within(mean.view(), TOLERANCE); outputs]
+        vec![last_within(mean.view(), TOLERANCE); outputs]
     }
 }
-
-/// The share of a held-out squared error that is given for a stronger ridge: half a per cent of an
-/// RMSE, which some thousands of rows do not tell from chance. Scores are often as flat over many
-/// decades of the strength, and the weakest of those has output weights thousands of times larger,
-/// which only cancel among the rows that the choice was made on.
-pub(crate) const TOLERANCE: f64 = 0.01;
 
 /// The largest relative error of one rounding, half of epsilon.
 fn unit_roundoff<A: Scalar>() -> f64 {

@@ -37,7 +37,7 @@ impl Threshold {
     /// From these on sums of products, where their condition or the strength of ridge allows them, take less
     /// time than a factorization of the matrix.
     pub(super) const PRODUCTS: Self = Self {
-        rows_per_column: 4,
+        rows_per_column: 2,
         entries: 1 << 17,
     };
 
