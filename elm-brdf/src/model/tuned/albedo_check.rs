@@ -29,6 +29,9 @@ const ALLOWED: f64 = 1.05;
 pub(super) struct AlbedoCheck {
     /// For each angle of the light the albedo that is allowed, and its nodes.
     angles: Vec<(f64, Vec<Node>)>,
+    /// What the nearest measurements give for these, in the order of light and viewer and in the other, as
+    /// far as it was asked for: the same for all networks of the same inputs.
+    implied: Vec<[Option<Vec<f64>>; 2]>,
 }
 
 impl AlbedoCheck {
@@ -41,29 +44,32 @@ impl AlbedoCheck {
             &[0.0]
         };
         let angles = albedo::ANGLES.into_iter().chain(FURTHER_ANGLES);
+        let angles: Vec<_> = angles
+            .flat_map(|angle| turns.iter().map(move |&turn| (angle, turn)))
+            .map(|(angle, turn)| {
+                let allowed = if angle > GRAZING {
+                    GRAZING_ALLOWED
+                } else {
+                    1.0
+                };
+                let mut nodes = albedo::nodes(angle.to_radians());
+                for node in &mut nodes {
+                    node.pair = node.pair.turned(turn);
+                }
+                (allowed, nodes)
+            })
+            .collect();
         Self {
-            angles: angles
-                .flat_map(|angle| turns.iter().map(move |&turn| (angle, turn)))
-                .map(|(angle, turn)| {
-                    let allowed = if angle > GRAZING {
-                        GRAZING_ALLOWED
-                    } else {
-                        1.0
-                    };
-                    let mut nodes = albedo::nodes(angle.to_radians());
-                    for node in &mut nodes {
-                        node.pair = node.pair.turned(turn);
-                    }
-                    (allowed, nodes)
-                })
-                .collect(),
+            implied: vec![[None, None]; angles.len()],
+            angles,
         }
     }
 
     /// By how much the albedo, for light or for viewer at one of the angles, is above 1 (near the horizon
-    /// 1.5) and above a twentieth more than the nearest measurements give, whose targets `nearest` says.
+    /// 1.5) and above a twentieth more than the nearest measurements give, whose targets `nearest` says:
+    /// always the same, of the same features.
     pub(super) fn excess(
-        &self,
+        &mut self,
         features: Features,
         network: &Elm<f64>,
         transform: &FittedTransform,
@@ -75,7 +81,7 @@ impl AlbedoCheck {
         } else {
             &[false, true]
         };
-        for (allowed, nodes) in &self.angles {
+        for ((allowed, nodes), implied) in self.angles.iter().zip(&mut self.implied) {
             for &swapped in orders {
                 let of = |node: &Node| {
                     if swapped {
@@ -94,10 +100,15 @@ impl AlbedoCheck {
                 if found.iter().all(|&albedo| albedo <= allowed) {
                     continue;
                 }
-                let implied = sums(nearest(&pairs))?;
-                for (found, implied) in found.into_iter().zip(implied) {
+                let known = &mut implied[usize::from(swapped)];
+                let implied = match known.take() {
+                    Some(implied) => implied,
+                    None => sums(nearest(&pairs))?,
+                };
+                for (found, implied) in found.into_iter().zip(&implied) {
                     excess = excess.max(found - (ALLOWED * implied).max(allowed));
                 }
+                *known = Some(implied);
             }
         }
         Ok(excess)

@@ -60,32 +60,57 @@ type Near = (f64, usize);
 /// The measurements by their place.
 pub(super) struct Neighborhood {
     places: Vec<[f64; 5]>,
+    /// The same with their rows, the first coordinate rising.
+    rising: Vec<([f64; 5], usize)>,
     anisotropic: bool,
 }
 
 impl Neighborhood {
     pub(super) fn new(pairs: &[DirectionPair], anisotropic: bool) -> Self {
+        let places: Vec<_> = pairs.iter().map(|pair| place(pair, anisotropic)).collect();
+        let mut rising: Vec<_> = places.iter().copied().zip(0..).collect();
+        rising.sort_by(|(a, _), (b, _)| a[0].total_cmp(&b[0]));
         Self {
-            places: pairs.iter().map(|pair| place(pair, anisotropic)).collect(),
+            places,
+            rising,
             anisotropic,
         }
     }
 
-    /// The nearest measurements but `without`, the nearest first.
+    /// The nearest measurements but `without`, the nearest first, of equally near ones the first row.
     fn nearest(&self, at: [f64; 5], count: usize, without: Option<usize>) -> Vec<Near> {
         let mut near: Vec<Near> = Vec::with_capacity(count + 1);
-        for (row, place) in self.places.iter().enumerate() {
-            let along = place.iter().zip(&at).map(|(a, b)| (a - b).powi(2));
-            let distance: f64 = along.sum();
+        // From where the first coordinates agree both ways, up to where they alone differ by more than the
+        // farthest place that is known.
+        let middle = self.rising.partition_point(|(place, _)| place[0] < at[0]);
+        let (before, after) = self.rising.split_at(middle);
+        let mut below = before.iter().rev().peekable();
+        let mut above = after.iter().peekable();
+        let apart = |next: Option<&&([f64; 5], usize)>| {
+            next.map_or(f64::INFINITY, |(place, _)| (place[0] - at[0]).powi(2))
+        };
+        loop {
+            let (down, up) = (apart(below.peek()), apart(above.peek()));
+            let next = if down <= up {
+                below.next()
+            } else {
+                above.next()
+            };
             let full = near.len() == count;
-            if Some(row) == without || full && near.last().is_some_and(|last| distance >= last.0) {
+            let Some(&(place, row)) =
+                next.filter(|_| !full || near.last().is_some_and(|last| down.min(up) <= last.0))
+            else {
+                return near;
+            };
+            let along = place.iter().zip(&at).map(|(a, b)| (a - b).powi(2));
+            let found = (along.sum::<f64>(), row);
+            if Some(row) == without || full && near.last().is_some_and(|last| found >= *last) {
                 continue;
             }
-            let after = near.partition_point(|known| known.0 <= distance);
-            near.insert(after, (distance, row));
+            let after = near.partition_point(|known| *known <= found);
+            near.insert(after, found);
             near.truncate(count);
         }
-        near
     }
 
     /// The guess for each of `pairs` of what `values`, shape (measurements, channels), are there.
@@ -252,4 +277,29 @@ fn about(axis: [f64; 3], direction: [f64; 3]) -> [f64; 3] {
     let (sin, cos) = (axis[0], dot(axis, NORMAL));
     let [x, y, z] = direction;
     [cos * x + sin * z, y, cos * z - sin * x]
+}
+
+#[test]
+fn the_nearest_are_those_of_all_measurements() {
+    let pairs = scatter(&mut generator(7, streams::ANCHORS), true);
+    for anisotropic in [false, true] {
+        // Every place twice: of equally near ones the first row counts.
+        let twice: Vec<DirectionPair> = pairs.iter().chain(&pairs).copied().collect();
+        let neighborhood = Neighborhood::new(&twice, anisotropic);
+        for (number, pair) in pairs.iter().enumerate().step_by(7) {
+            let at = place(pair, anisotropic);
+            let distance = |place: &[f64; 5]| -> f64 {
+                let along = place.iter().zip(&at).map(|(a, b)| (a - b).powi(2));
+                along.sum()
+            };
+            let places = neighborhood.places.iter().enumerate();
+            let mut all: Vec<Near> = places.map(|(row, at)| (distance(at), row)).collect();
+            all.sort_by(|a, b| a.partial_cmp(b).unwrap());
+            assert_eq!(neighborhood.nearest(at, 9, None), all[..9]);
+            let without = neighborhood.nearest(at, 9, Some(number));
+            all.retain(|(_, row)| *row != number);
+            assert_eq!(without, all[..9]);
+            assert_eq!(neighborhood.nearest(at, 5000, None).len(), twice.len());
+        }
+    }
 }

@@ -112,7 +112,7 @@ impl Problem<'_> {
     fn like(&self, features: Features, map: &FeatureMap<f64>, places: &Places) -> Result<Fitted> {
         let h = map.transform(&places.x)?;
         let judged = map.transform(&features.compute(&self.judged_pairs))?;
-        let albedo = AlbedoCheck::new(self.anisotropic);
+        let mut albedo = AlbedoCheck::new(self.anisotropic);
         let mut best: Option<Fitted> = None;
         let mut between = BETWEEN;
         for _ in 0..=STEPS {

@@ -32,6 +32,9 @@ const STEPS: usize = 6;
 /// Rounds of working residuals end where targets move by a two-thousandth of their size.
 const CONVERGED: f64 = 2.5e-7;
 
+/// Values of a hidden layer that are kept from round to round.
+const KEPT: usize = 1 << 23;
+
 /// What a layer came to.
 pub(super) struct Finished {
     pub(super) features: Features,
@@ -51,6 +54,14 @@ pub(super) struct Fitted {
     pub(super) held_out: Array2<f64>,
     /// By how much the albedo is above what it may be, 0 where it is not.
     pub(super) excess: f64,
+}
+
+/// The fits without a fold each.
+struct LeftOut {
+    /// Of the targets of all judged rows, each by the fit without its fold.
+    predicted: Array2<f64>,
+    /// Of one of these fits.
+    weights: Weights,
 }
 
 impl Problem<'_> {
@@ -84,12 +95,12 @@ impl Problem<'_> {
         let (strength, held_out) = self.strength(&rows, &reach, None, (2..STRENGTHS).step_by(2))?;
         let at_anchors = map.transform(&features.compute(&self.anchors.pairs))?;
         let mut pull = Pull::new(self, at_anchors, &self.variances(&held_out));
-        let albedo = AlbedoCheck::new(self.anisotropic);
-        let mut best = None;
+        let mut albedo = AlbedoCheck::new(self.anisotropic);
+        let (mut best, mut kept) = (None, Vec::new());
         for _ in 0..=STEPS {
             let near = rows.near(strength);
             let (strength, held_out) = self.strength(&rows, &reach, Some(&pull), near)?;
-            let weights = self.solve(&rows, map, x, strength, &pull)?;
+            let weights = self.solve(&rows, map, x, strength, &pull, &mut kept)?;
             let network = Elm::from_parts(map.clone(), weights.beta, weights.intercept)?;
             let excess = albedo.excess(features, &network, &self.transform, |pairs| {
                 self.neighbors_guess(pairs)
@@ -152,16 +163,18 @@ impl Problem<'_> {
         cut_off_means(squares.view())
     }
 
-    /// Predictions of the targets of all judged rows, each by the fit without its fold.
+    /// For each strength, of which some may leave equations without a triangle.
     fn held_out(
         &self,
         rows: &Rows,
-        strength: f64,
+        strengths: &[f64],
         pull: Option<&Pull>,
-    ) -> Result<Option<(Array2<f64>, Weights)>> {
-        let mut predicted = Array2::zeros((self.judged.len(), self.targets.ncols()));
+    ) -> Result<Vec<Option<LeftOut>>> {
+        let outputs = self.targets.ncols();
+        let mut predicted = vec![Array2::zeros((self.judged.len(), outputs)); strengths.len()];
+        let mut whole: Vec<Option<Weights>> = vec![None; strengths.len()];
+        let mut left_out: Vec<bool> = vec![false; strengths.len()];
         let mut first = 0;
-        let mut whole = None;
         for (number, fold) in self.folds.iter().enumerate() {
             let mut left = rows.total.clone();
             if self.folds.len() > 1 {
@@ -170,17 +183,35 @@ impl Problem<'_> {
             if let Some(pull) = pull {
                 left.add(&pull.without[number], pull.times);
             }
-            let Some(factor) = left.factor(strength) else {
-                return Ok(None);
-            };
-            let weights = factor.solve(&left)?;
+            for (number, &strength) in strengths.iter().enumerate() {
+                whole[number] = match left.factor(strength) {
+                    Some(factor) => Some(factor.solve(&left)?),
+                    None => None,
+                };
+                left_out[number] |= whole[number].is_none();
+            }
             let range = Slice::from(first..first + fold.len());
-            let fitted = weights.apply(rows.judged.slice_axis(Axis(0), range));
-            predicted.slice_axis_mut(Axis(0), range).assign(&fitted);
             first += fold.len();
-            whole = Some(weights);
+            // One product for all strengths.
+            let fitted = Weights::joined(whole.iter().flatten());
+            let fitted = fitted.apply(rows.judged.slice_axis(Axis(0), range));
+            let parts = fitted.axis_chunks_iter(Axis(1), outputs);
+            let there = predicted
+                .iter_mut()
+                .zip(&whole)
+                .filter(|(_, weights)| weights.is_some());
+            for ((predicted, _), fitted) in there.zip(parts) {
+                predicted.slice_axis_mut(Axis(0), range).assign(&fitted);
+            }
         }
-        Ok(whole.map(|weights| (predicted, weights)))
+        let found = predicted.into_iter().zip(whole).zip(left_out);
+        Ok(found
+            .map(|((predicted, whole), left_out)| {
+                whole
+                    .filter(|_| !left_out)
+                    .map(|weights| LeftOut { predicted, weights })
+            })
+            .collect())
     }
 
     /// What squared errors of each output are relative to: the variance of its targets, which for coordinates
@@ -205,12 +236,14 @@ impl Problem<'_> {
     ) -> Result<(f64, Array2<f64>)> {
         let spread = self.spread();
         let mut tried: Vec<(f64, f64, Array2<f64>)> = Vec::new();
-        for step in steps {
-            let strength = rows.scale * WEAKEST * 10_f64.powf(step as f64 / 2.0);
-            let Some((held_out, weights)) = self.held_out(rows, strength, pull)? else {
+        let strength = |step: usize| rows.scale * WEAKEST * 10_f64.powf(step as f64 / 2.0);
+        let strengths: Vec<f64> = steps.map(strength).collect();
+        let found = self.held_out(rows, &strengths, pull)?;
+        for (strength, found) in strengths.into_iter().zip(found) {
+            let Some(LeftOut { predicted, weights }) = found else {
                 continue;
             };
-            let errors = self.variances(&held_out);
+            let errors = self.variances(&predicted);
             let rounded = rounding(weights.beta.view(), reach.view());
             let score: f64 = errors
                 .iter()
@@ -219,7 +252,7 @@ impl Problem<'_> {
                 .map(|((error, rounded), spread)| (error + ROUNDING * rounded.powi(2)) / spread)
                 .sum();
             if score.is_finite() {
-                tried.push((score, strength, held_out));
+                tried.push((score, strength, predicted));
             }
         }
         let by_score = |&a: &usize, &b: &usize| tried[a].0.total_cmp(&tried[b].0);
@@ -263,6 +296,8 @@ impl Problem<'_> {
     /// logarithmic transform whose deviation is proportional to $f + o$ (R. Wedderburn, *Quasi-Likelihood
     /// Functions, Generalized Linear Models, and the Gauss-Newton Method*, Biometrika 61(3), 1974),
     /// solved by the same factorisation.
+    ///
+    /// Tiles of the hidden-layer matrix are `kept` from one call to the next where there is room for all.
     fn solve(
         &self,
         rows: &Rows,
@@ -270,6 +305,7 @@ impl Problem<'_> {
         x: &Array2<f64>,
         strength: f64,
         pull: &Pull,
+        kept: &mut Vec<Array2<f64>>,
     ) -> Result<Weights> {
         let mut all = rows.total.clone();
         all.add(&pull.all, pull.times);
@@ -279,12 +315,18 @@ impl Problem<'_> {
             return Ok(weights);
         }
         let mut censored = Censored::new(self.values, &self.noise);
+        let keep = x.nrows() * weights.beta.nrows() <= KEPT;
         for _ in 0..censored.rounds() {
             let mut z = Array2::zeros(self.targets.dim());
             let mut moved = rows.total.without_targets();
-            for first in (0..x.nrows()).step_by(TILE) {
+            for (number, first) in (0..x.nrows()).step_by(TILE).enumerate() {
                 let tile = Slice::from(first..(first + TILE).min(x.nrows()));
-                let h = map.transform(&x.slice_axis(Axis(0), tile))?;
+                let made = if number < kept.len() {
+                    None
+                } else {
+                    Some(map.transform(&x.slice_axis(Axis(0), tile))?)
+                };
+                let h = made.as_ref().unwrap_or_else(|| &kept[number]);
                 let fitted = weights.apply(h.view());
                 let values = self.values.slice_axis(Axis(0), tile);
                 let means = self.transform.to_values(fitted.clone())?;
@@ -292,8 +334,11 @@ impl Problem<'_> {
                 let working = self
                     .transform
                     .working_targets(fitted.view(), values.view())?;
-                moved.add_cross(&rows.total.again(&h, &working, None), 1.0);
+                moved.add_cross(&rows.total.again(h, &working, None), 1.0);
                 z.slice_axis_mut(Axis(0), tile).assign(&working);
+                if keep {
+                    kept.extend(made);
+                }
             }
             let guesses = self.guesses(&z, |_| true);
             moved.add_cross(

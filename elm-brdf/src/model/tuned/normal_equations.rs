@@ -7,7 +7,7 @@
 
 use elm::solve::Cholesky;
 use ndarray::linalg::general_mat_mul;
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, ShapeBuilder, Slice};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, ShapeBuilder, Slice, concatenate};
 
 use crate::error::Result;
 
@@ -70,6 +70,19 @@ pub(super) struct Weights {
 }
 
 impl Weights {
+    /// The outputs of all of these, one after the other.
+    pub(super) fn joined<'a>(all: impl Iterator<Item = &'a Self>) -> Self {
+        let (mut betas, mut intercepts) = (Vec::new(), Vec::new());
+        for weights in all {
+            betas.push(weights.beta.view());
+            intercepts.extend(&weights.intercept);
+        }
+        Self {
+            beta: concatenate(Axis(1), &betas).unwrap_or_default(),
+            intercept: intercepts.into(),
+        }
+    }
+
     pub(super) fn apply(&self, h: ArrayView2<'_, f64>) -> Array2<f64> {
         thin_product(h, &self.beta) + &self.intercept
     }
