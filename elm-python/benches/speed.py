@@ -58,6 +58,9 @@ def gfdl():
 
 METHODS = {
     "ElmRegressor(200)": lambda: ElmRegressor(NEURONS, random_state=0, n_jobs=int(THREADS)),
+    "ElmRegressor(200, alpha=1e-6)": lambda: ElmRegressor(
+        NEURONS, alpha=1e-6, random_state=0, n_jobs=int(THREADS)
+    ),
     "RBFSampler + RidgeCV": lambda: make_pipeline(
         StandardScaler(), RBFSampler(n_components=NEURONS, random_state=0), RidgeCV()
     ),

@@ -4,6 +4,9 @@
 //! Work goes to rayon's current pool: all cores, unless the program says otherwise or calls from a pool of
 //! its own (`pool.install(|| params.fit(&x, &t))`). Small problems stay on the thread that asks.
 
+use std::collections::BTreeMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use ndarray::Array2;
 
 use crate::error::{Error, Result};
@@ -158,9 +161,10 @@ pub(crate) fn reduce<I: Send, R: Send>(
     Ok(all)
 }
 
-/// The sum of what `work` adds to zeros for each item, in their order; nothing of none. Items on one thread
-/// share working memory and, where there is one thread, room for what is added: new pages for every item
-/// would take longer than small sums.
+/// The sum of what `work` adds to zeros for each item, in their order; nothing of none.
+///
+/// Each thread takes the next item, and room that an earlier sum has left: new pages for every item would take
+/// longer than small sums.
 ///
 /// # Errors
 /// The first of `work`.
@@ -170,33 +174,90 @@ pub(crate) fn sum<I: Send, S, A: Scalar>(
     memory: impl Fn() -> S + Sync,
     work: impl Fn(&mut S, I, &mut Array2<A>) -> Result<()> + Sync,
 ) -> Result<Option<Array2<A>>> {
-    let mut all: Option<Array2<A>> = None;
-    if current_threads() > 1 {
-        let sum_of = |memory: &mut S, item| {
-            let mut sum = zeros();
-            work(memory, item, &mut sum).map(|()| sum)
-        };
-        for part in map_with(items, memory, sum_of) {
-            let part = part?;
-            match &mut all {
-                Some(all) => *all += &part,
+    let workers = current_threads().min(items.len());
+    let rest = Mutex::new(items.into_iter().enumerate());
+    let sums = Mutex::new(Sums::default());
+    map(vec![(); workers], |()| {
+        let mut memory = memory();
+        loop {
+            let Some((number, item)) = locked(&rest).next() else {
+                return;
+            };
+            let mut known = locked(&sums);
+            if known.failed.is_some() {
+                return;
+            }
+            let room = known.free.pop();
+            drop(known);
+            let mut part = room.map_or_else(&zeros, |mut part| {
+                part.fill(A::zero());
+                part
+            });
+            let added = work(&mut memory, item, &mut part).map(|()| part);
+            locked(&sums).add(number, added);
+        }
+    });
+    let sums = sums.into_inner().unwrap_or_else(PoisonError::into_inner);
+    match sums.failed {
+        Some((_, error)) => Err(error),
+        None => Ok(sums.all),
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A sum of parts that come in any order.
+struct Sums<A: Scalar> {
+    /// Of the first parts, so many.
+    all: Option<Array2<A>>,
+    count: usize,
+    /// Parts that wait for earlier ones.
+    early: BTreeMap<usize, Array2<A>>,
+    free: Vec<Array2<A>>,
+    failed: Option<(usize, Error)>,
+}
+
+impl<A: Scalar> Default for Sums<A> {
+    fn default() -> Self {
+        Self {
+            all: None,
+            count: 0,
+            early: BTreeMap::new(),
+            free: Vec::new(),
+            failed: None,
+        }
+    }
+}
+
+impl<A: Scalar> Sums<A> {
+    fn add(&mut self, number: usize, part: Result<Array2<A>>) {
+        match part {
+            Ok(part) => {
+                self.early.insert(number, part);
+            }
+            Err(error) => {
+                if self
+                    .failed
+                    .as_ref()
+                    .is_none_or(|(first, _)| number < *first)
+                {
+                    self.failed = Some((number, error));
+                }
+            }
+        }
+        while let Some(part) = self.early.remove(&self.count) {
+            self.count += 1;
+            match &mut self.all {
+                Some(all) => {
+                    *all += &part;
+                    self.free.push(part);
+                }
                 none => *none = Some(part),
             }
         }
-        return Ok(all);
     }
-    let (mut memory, mut part) = (memory(), None);
-    for item in items {
-        let Some(all) = &mut all else {
-            work(&mut memory, item, all.insert(zeros()))?;
-            continue;
-        };
-        let part = part.get_or_insert_with(&zeros);
-        part.fill(A::zero());
-        work(&mut memory, item, part)?;
-        *all += &*part;
-    }
-    Ok(all)
 }
 
 /// Bounds of up to `parts` parts of about the same number of items.
@@ -225,6 +286,37 @@ mod tests {
                 squares.unwrap(),
                 (0..100).map(|i| i * i).collect::<Vec<_>>()
             );
+        }
+    }
+
+    #[test]
+    fn sums_are_the_same_bits_and_the_first_error_is_told() {
+        let sum_of = |threads, from: usize| {
+            on_threads(threads, || {
+                sum(
+                    (0..40).collect(),
+                    || Array2::<f64>::zeros((3, 2)),
+                    || (),
+                    |(), item: usize, sum| {
+                        if item >= from {
+                            return Err(Error::Parameter {
+                                name: "item",
+                                value: item as f64,
+                                expected: "less",
+                            });
+                        }
+                        *sum += 1.0 / (1.0 + item as f64);
+                        Ok(())
+                    },
+                )
+            })
+            .unwrap()
+        };
+        let alone = sum_of(1, 99).unwrap();
+        for threads in 1..5 {
+            assert_eq!(sum_of(threads, 99).unwrap(), alone);
+            let error = sum_of(threads, 7).unwrap_err();
+            assert!(error.to_string().contains('7'), "{error}");
         }
     }
 
