@@ -163,8 +163,8 @@ pub(crate) fn reduce<I: Send, R: Send>(
 
 /// The sum of what `work` adds to zeros for each item, in their order; nothing of none.
 ///
-/// Each thread takes the next item, and room that an earlier sum has left: new pages for every item would take
-/// longer than small sums.
+/// Each thread takes the next item, and room that an earlier sum has left: new pages for every item would
+/// take longer than small sums.
 ///
 /// # Errors
 /// The first of `work`.
