@@ -14,8 +14,7 @@ use crate::scalar::Scalar;
 /// Freedom below which a difference from 1 is not relied on.
 pub(super) const CLOSE: f64 = 1e-4;
 
-/// The most rows that are taken where there is another way: each strength has a factorization of a matrix of
-/// as many rows.
+/// The most rows that [`by_sums`] should be given: each strength has a factorization of a matrix of as many.
 pub(super) const MOST: usize = 128;
 
 /// The sums of the squared leave-one-out residuals of rows, or of their `excess` over squared residuals, from
@@ -57,7 +56,6 @@ pub(super) fn by_triangle<A: Scalar>(
         hidden: own_hidden,
         targets: own_targets,
         roots,
-        ..
     } = Own::of_tiles(tiles, &means, close)?;
     let extra = usize::from(spectrum.frame.intercept);
     let (ones, others) = r.view().split_at(Axis(1), extra);
@@ -84,7 +82,7 @@ pub(super) fn by_triangle<A: Scalar>(
 struct Own {
     hidden: Array2<f64>,
     targets: Array2<f64>,
-    /// Of their weights, which the others are multiplied by.
+    /// Of their weights; hidden values and targets are multiplied by these.
     roots: Array1<f64>,
 }
 

@@ -17,8 +17,8 @@ use crate::threads;
 
 /// As [`scores`](super::leave_one_out::scores), from one more pass over the rows of `spectrum`.
 ///
-/// A row has the coordinates $u = \\tilde h V / s$ in the singular vectors. Where it all but determines its
-/// own fit, $1 - \\sum_j u_j^2$ has no digits left: there are no more such rows than neurons, and these are
+/// A row has the coordinates $u = \tilde h V / s$ in the singular vectors. Where it all but determines its
+/// own fit, $1 - \sum_j u_j^2$ has no digits left: there are no more such rows than neurons, and these are
 /// compared with the fit of the others. Nothing where they are too many for that.
 ///
 /// # Errors
@@ -30,11 +30,7 @@ pub(super) fn scores_of_tiles<A: Scalar>(
     roundoff: f64,
 ) -> Result<Option<Array2<f64>>> {
     let mean = spectrum.means();
-    let condition = match (spectrum.s.first(), spectrum.s.last()) {
-        (Some(first), Some(last)) => first / last,
-        _ => 1.0,
-    };
-    let lightest = Light::limit(condition);
+    let lightest = Light::limit(spectrum.condition());
     // Where half of the rows would be done again, the first time is lost.
     let leverage = spectrum.s.len() as f64 / spectrum.frame.weighted_rows as f64;
     let single = spectrum.route == Route::GramSvd && leverage < 0.7 * lightest;
@@ -104,7 +100,7 @@ pub(super) fn squared_residuals(spectrum: &DesignSvd<f64>, candidates: &[f64]) -
     sums
 }
 
-/// [`CLOSE`] where sums of products leave $\\epsilon / \\lambda$ of error in a leverage: that must be less
+/// [`CLOSE`] where sums of products leave $\epsilon / \lambda$ of error in a leverage: that must be less
 /// than a ten thousandth of it.
 fn least_freedom(candidates: &[f64]) -> f64 {
     let weakest = candidates.iter().copied().fold(f64::INFINITY, f64::min);

@@ -47,7 +47,7 @@ impl Ridge {
         spectrum: &DesignSvd<f64>,
         roundoff: f64,
     ) -> Result<Option<Solution<f64>>> {
-        let found = if self.lambda() == Lambda::Gcv {
+        let (lambda, errors) = if self.lambda() == Lambda::Gcv {
             (self.by_gcv(spectrum, roundoff), None)
         } else {
             let candidates = distinguishable_lambdas(spectrum);
@@ -68,7 +68,6 @@ impl Ridge {
                 self.lambda_and_errors(spectrum, &candidates, &scores, (roundoff, true));
             (lambda, Some(errors))
         };
-        let (lambda, errors) = found;
         let mut solution = ridge_solution(spectrum, Reason::LambdaSearch, &lambda, errors);
         let weak = |lambda: &f64| *lambda < gram::weakest();
         if spectrum.weakest.is_some() && lambda.iter().any(weak) {

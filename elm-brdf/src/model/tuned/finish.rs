@@ -163,7 +163,7 @@ impl Problem<'_> {
         cut_off_means(squares.view())
     }
 
-    /// For each strength, of which some may leave equations without a triangle.
+    /// The fits without each fold, for every strength that leaves the equations of all folds a triangle.
     fn held_out(
         &self,
         rows: &Rows,
@@ -173,7 +173,7 @@ impl Problem<'_> {
         let outputs = self.targets.ncols();
         let mut predicted = vec![Array2::zeros((self.judged.len(), outputs)); strengths.len()];
         let mut whole: Vec<Option<Weights>> = vec![None; strengths.len()];
-        let mut left_out: Vec<bool> = vec![false; strengths.len()];
+        let mut failed: Vec<bool> = vec![false; strengths.len()];
         let mut first = 0;
         for (number, fold) in self.folds.iter().enumerate() {
             let mut left = rows.total.clone();
@@ -188,7 +188,7 @@ impl Problem<'_> {
                     Some(factor) => Some(factor.solve(&left)?),
                     None => None,
                 };
-                left_out[number] |= whole[number].is_none();
+                failed[number] |= whole[number].is_none();
             }
             let range = Slice::from(first..first + fold.len());
             first += fold.len();
@@ -204,11 +204,11 @@ impl Problem<'_> {
                 predicted.slice_axis_mut(Axis(0), range).assign(&fitted);
             }
         }
-        let found = predicted.into_iter().zip(whole).zip(left_out);
+        let found = predicted.into_iter().zip(whole).zip(failed);
         Ok(found
-            .map(|((predicted, whole), left_out)| {
+            .map(|((predicted, whole), failed)| {
                 whole
-                    .filter(|_| !left_out)
+                    .filter(|_| !failed)
                     .map(|weights| LeftOut { predicted, weights })
             })
             .collect())
