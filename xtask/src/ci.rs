@@ -87,8 +87,8 @@ pub(crate) fn all() -> Result {
         "cargo clippy --workspace --all-targets --features elm-brdf/fetch --locked -- -D warnings",
     ))?;
     run(command(
-        "cargo test --workspace --features elm-brdf/fetch --test fetch --test help --locked \
-         -- --include-ignored",
+        "cargo test --workspace --features elm-brdf/fetch --test all --locked \
+         -- --include-ignored fetch:: help::",
     ))?;
 
     step("documentation, warnings are errors");

@@ -80,7 +80,7 @@ const TABLES: &[(&str, &str, &str)] = &[
     (
         "spheres",
         "rendering.md: RGL spheres",
-        "cargo test --release --locked -p elm-brdf --test rgl_spheres -- --ignored --nocapture",
+        "cargo test --release --locked -p elm-brdf --test all rgl_spheres:: -- --ignored --nocapture",
     ),
 ];
 

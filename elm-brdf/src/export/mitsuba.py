@@ -297,7 +297,9 @@ def make():
             bs.eta = 1.0
             bs.sampled_type = +mi.BSDFFlags.GlossyReflection
             bs.sampled_component = 0
-            return bs, dr.select(active, value / dr.select(active, pdf, 1.0), 0.0)
+            # A weight of 0 would say that nothing was drawn, which is not so where the material is black.
+            weight = dr.maximum(value / dr.select(active, pdf, 1.0), 1e-30)
+            return bs, dr.select(active, weight, 0.0)
 
         def eval_pdf_sample(self, ctx, si, wo, sample1, sample2, active=True):
             return (*self.eval_pdf(ctx, si, wo, active), *self.sample(ctx, si, sample1, sample2, active))

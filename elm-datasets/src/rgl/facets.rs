@@ -2,6 +2,8 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use ndarray::ArrayView1;
+
 use super::warp::Size;
 use super::{Table, square};
 use crate::brdf::{Brdf, EvalError};
@@ -13,6 +15,10 @@ const LEAST_DENSITY: f64 = 1e-3;
 /// angles alike, and next to the normal, where these have no area.
 const LEAST_VISIBLE: f64 = 1e-3;
 const LEAST_AT_NORMAL: f64 = 1e-6;
+/// How many times as many points as visible normals call for may lie anywhere. Next to the normal of the
+/// surface, where a square of the table is no area, densities that fall less fast than the area would be a
+/// peak to draw.
+const MOST_POINTS: f64 = 100.0;
 /// Steps of the power iteration; the authors' converges in four.
 const STEPS: usize = 8;
 
@@ -80,9 +86,10 @@ impl Facets {
         self.sigma.at(0, unit_square(direction))
     }
 
-    /// A density of normals over a table of the unit square: half of those that are seen from `incident`,
-    /// half in proportion to what they reflect, so that a highlight which the microfacets do not explain, as
-    /// at grazing angles, has its share of the points. No integral is asked of it.
+    /// A density of normals over a table of the unit square, which the points of the tables of values follow:
+    /// half in proportion to the normals that are seen from `incident`, half to how fast
+    /// $\ln(1 + f \cos\theta_o)$ changes along their elevation, so that a narrow highlight has points on its
+    /// flanks. No integral is asked of it.
     pub(super) fn visible(
         &self,
         brdf: &dyn Brdf,
@@ -103,21 +110,21 @@ impl Facets {
             })
             .collect();
         let values = brdf.eval(&pairs)?;
-        let (mut seen, mut reflected) = (Vec::new(), Vec::new());
-        for (index, (point, &normal)) in points(size).into_iter().zip(&normals).enumerate() {
-            let facing = dot(incident, normal).max(0.0) * stretch(point);
-            let light = viewers[index][2].max(0.0);
-            let value: f64 = values.row(index).iter().copied().map(safe).sum();
-            seen.push(self.ndf.at(0, point) * facing / area);
-            reflected.push(value * light * facing);
-        }
-        let count = seen.len() as f64;
-        let total: f64 = reflected.iter().sum::<f64>() / count;
+        let logarithms = values.rows().into_iter().zip(&viewers);
+        let logarithms: Vec<f64> = logarithms
+            .map(|(row, viewer)| (mean(row) * viewer[2].max(0.0)).ln_1p())
+            .collect();
+        let lines = logarithms.chunks_exact(size.width);
+        let changed: Vec<f64> = lines.flat_map(changes).collect();
+        let total = changed.iter().sum::<f64>() / changed.len() as f64;
         let scale = if total > 0.0 { 1.0 / total } else { 0.0 };
-        let all = seen.iter().zip(&reflected).zip(points(size));
-        let density = |((seen, reflected), point): ((&f64, &f64), _)| {
+        let all = points(size).into_iter().zip(&normals).zip(changed);
+        let density = |((point, &normal), change): (([f64; 2], &Vector), f64)| {
+            let facing = dot(incident, normal).max(0.0) * stretch(point);
+            let seen = self.ndf.at(0, point) * facing / area;
+            let changing = (scale * change).min(MOST_POINTS * seen);
             let least = LEAST_VISIBLE * stretch(point) / TAU + LEAST_AT_NORMAL;
-            (0.5 * seen + 0.5 * scale * reflected + least) as f32
+            (0.5 * seen + 0.5 * changing + least) as f32
         };
         Ok(all.map(density).collect())
     }
@@ -137,8 +144,30 @@ pub(super) fn safe(value: f64) -> f64 {
     }
 }
 
+/// The mean of all channels, as far as a table can hold them.
+pub(super) fn mean(channels: ArrayView1<'_, f64>) -> f64 {
+    channels.iter().copied().map(safe).sum::<f64>() / channels.len() as f64
+}
+
+/// How much values along a line change on both sides of each. None at the normal, where a line begins: there
+/// the next value on its other side is the same.
+fn changes(line: &[f64]) -> Vec<f64> {
+    let step = |index: usize| match line.get(index..index + 2) {
+        Some(&[a, b]) => (b - a).abs(),
+        _ => 0.0,
+    };
+    let at = |index: usize| {
+        if index == 0 {
+            0.0
+        } else {
+            step(index - 1) + step(index)
+        }
+    };
+    (0..line.len()).map(at).collect()
+}
+
 /// Where a direction lies in its unit square.
-fn unit_square(direction: Vector) -> [f64; 2] {
+pub(super) fn unit_square(direction: Vector) -> [f64; 2] {
     let (theta, phi) = polar(direction);
     [square(theta), (phi + PI) / TAU]
 }
@@ -163,7 +192,7 @@ fn directions(size: Size) -> Vec<Vector> {
 }
 
 /// The solid angle of a part of the unit square over its area.
-fn stretch([u, _]: [f64; 2]) -> f64 {
+pub(super) fn stretch([u, _]: [f64; 2]) -> f64 {
     2.0 * PI * PI * u * (u * u * FRAC_PI_2).sin()
 }
 

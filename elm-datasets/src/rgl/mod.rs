@@ -42,6 +42,7 @@
 
 mod azimuths;
 mod facets;
+mod points;
 mod tensor;
 mod warp;
 mod write;

@@ -194,6 +194,23 @@ impl Warp {
         ]
     }
 
+    /// Of each slice.
+    pub(super) fn size(&self) -> Size {
+        self.size
+    }
+
+    /// The density of a slice at a point, with integral 1.
+    pub(super) fn density(&self, slice: usize, point: [f64; 2]) -> f64 {
+        let Place { column, row, x, y } = self.size.place(point);
+        let (width, height) = (self.size.width, self.size.height);
+        let at = |c: usize, r: usize| {
+            let index = (slice * height + row + r) * width + column + c;
+            self.density.get(index).copied().unwrap_or(f64::NAN)
+        };
+        let cells = ((width - 1) * (height - 1)) as f64;
+        cells * mix(y, mix(x, at(0, 0), at(1, 0)), mix(x, at(0, 1), at(1, 1)))
+    }
+
     /// Which point of the unit square [`flatten`](Self::flatten) takes to this one, under one slice's
     /// density.
     pub(super) fn unflatten(&self, slice: usize, [x, y]: [f64; 2]) -> [f64; 2] {
@@ -299,6 +316,20 @@ mod tests {
                 assert!((u - along).abs() < 1e-14, "{n} {x} {y}");
                 assert!((v - (y * y + y) / 2.0).abs() < 1e-14, "{n} {x} {y}");
             }
+        }
+    }
+
+    #[test]
+    fn a_density_has_the_integral_1() {
+        let size = Size {
+            width: 3,
+            height: 2,
+        };
+        let warp = Warp::new(size, [0.0, 1.0, 2.0, 0.0, 3.0, 6.0].into_iter()).unwrap();
+        // 4 x (1/2 + y): its integral is 2.
+        for [x, y] in [[0.0, 0.0], [0.3, 0.5], [1.0, 1.0]] {
+            let found = warp.density(0, [x, y]);
+            assert!((found - 2.0 * x * (0.5 + y)).abs() < 1e-14, "{found}");
         }
     }
 

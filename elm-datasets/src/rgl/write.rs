@@ -2,7 +2,8 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::facets::{Facets, direction, safe};
+use super::facets::{Facets, mean, safe};
+use super::points::Points;
 use super::tensor::{F32, MAGIC, U8};
 use super::warp::{Axis, Size, Warp};
 use super::{Channels, Table, square};
@@ -16,14 +17,14 @@ const ISOTROPIC: [usize; 6] = [16, 24, 32, 48, 64, 96];
 const ANISOTROPIC: [usize; 5] = [16, 24, 32, 48, 64];
 /// The most azimuths of a file with a grain: directions of its normals do not turn with the light.
 const MAX_AZIMUTHS: usize = 32;
+/// The most elevations, without a grain and with one.
+const MAX_ELEVATIONS: [usize; 2] = [48, MAX_AZIMUTHS / 2];
 /// Least and largest resolution.
 const RESOLUTIONS: [usize; 2] = [4, 256];
 /// The most wavelengths; the database's own files have 195.
 const MAX_WAVELENGTHS: usize = 500;
 /// The most numbers in a file: a quarter of the bytes that a reader takes.
 const MAX_NUMBERS: usize = 1 << 27;
-/// The least luminance over its mean, so that nothing is divided by zero.
-const LEAST_LUMINANCE: f64 = 1e-3;
 /// Pairs at which a file is held against its model.
 const CHECKED: u32 = 4096;
 
@@ -93,8 +94,8 @@ pub enum WriteError {
 /// The distribution of normals is found of the model's retro-reflection; azimuths `phi_i` are 0 alone, or go
 /// around the circle for a model that is not isotropic. Without a `resolution`, the points along each side of
 /// a table of values, the least of those tried is taken whose [error](Encoded::log_cosine_error) is at most
-/// 0.001, or the largest. There are as many elevations; or, with a grain, as many azimuths, at most 32, and
-/// half as many elevations. Values that are negative or no numbers become 0.
+/// 0.001, or the largest. There are as many elevations, at most 48; or, with a grain, as many azimuths, at
+/// most 32, and half as many elevations. Values that are negative or no numbers become 0.
 ///
 /// # Errors
 /// [`WriteError`].
@@ -211,18 +212,16 @@ impl Shape {
             let at = |index| f64::from((FRAC_PI_2 * share(index)) as f32);
             Axis((0..=steps).map(at).collect())
         };
-        let (phi_i, visible) = if facets.is_isotropic() {
-            (Axis(vec![0.0]), (128, 32))
+        let (phi_i, elevation_steps, visible) = if facets.is_isotropic() {
+            let steps = resolution.min(MAX_ELEVATIONS[0]);
+            (Axis(vec![0.0]), steps, (128, 32))
         } else {
-            (around(resolution.min(MAX_AZIMUTHS)), (64, 64))
+            let steps = (resolution / 2).min(MAX_ELEVATIONS[1]);
+            (around(resolution.min(MAX_AZIMUTHS)), steps, (64, 64))
         };
         Self {
             phi_i,
-            theta_i: elevations(if facets.is_isotropic() {
-                resolution
-            } else {
-                resolution.min(MAX_AZIMUTHS) / 2
-            }),
+            theta_i: elevations(elevation_steps),
             channels: channels.count(),
             visible: Size {
                 width: visible.0,
@@ -261,6 +260,8 @@ struct Tables {
     warp: Warp,
     /// By slice and channel.
     values: Table,
+    /// By slice.
+    luminance: Vec<f32>,
 }
 
 impl Tables {
@@ -275,32 +276,16 @@ impl Tables {
             Warp::new(shape.visible, vndf.iter().copied()).map_err(|_| WriteError::Resolution {
                 found: shape.values.width,
             })?;
-        let side = shape.values.width;
-        let mut numbers = Vec::with_capacity(incident.len() * shape.channels * side * side);
+        let (mut numbers, mut luminance) = (Vec::new(), Vec::new());
         for (slice, &light) in incident.iter().enumerate() {
-            let mut pairs = Vec::with_capacity(side * side);
-            let mut scales = Vec::with_capacity(side * side);
-            let area = 4.0 * facets.projected_area(light);
-            for index in 0..side * side {
-                let at = |index: usize| index as f64 / (side - 1) as f64;
-                let seen = warp.unflatten(slice, [at(index % side), at(index / side)]);
-                let viewer = reflect(light, direction(seen));
-                let is_above = viewer[2] > 0.0;
-                scales.push(if is_above {
-                    area * viewer[2] / facets.ndf.at(0, seen)
-                } else {
-                    0.0
-                });
-                pairs.push(DirectionPair {
-                    incident: light,
-                    outgoing: if is_above { viewer } else { light },
-                });
-            }
-            let values = brdf.eval(&pairs)?;
+            let points = Points::new(facets, &warp, shape.values, (slice, light));
+            let values = brdf.eval(&points.pairs)?;
             for channel in values.columns() {
-                let smooth = channel.iter().zip(&scales);
+                let smooth = channel.iter().zip(&points.scales);
                 numbers.extend(smooth.map(|(&value, scale)| (safe(value) * scale) as f32));
             }
+            let means: Vec<f64> = values.rows().into_iter().map(mean).collect();
+            luminance.extend(points.luminance(&means));
         }
         let values = Table {
             size: shape.values,
@@ -311,6 +296,7 @@ impl Tables {
             vndf,
             warp,
             values,
+            luminance,
         })
     }
 
@@ -335,28 +321,6 @@ impl Tables {
             };
             *value = blend.iter().map(part).sum::<f64>() * highlight;
         }
-    }
-
-    /// The mean of all channels, nowhere less than a part of its own mean: what directions are drawn by.
-    fn luminance(&self) -> Vec<f32> {
-        let area = self.shape.values.area();
-        let slices = self.values.numbers.chunks_exact(area * self.shape.channels);
-        let mean = |slice: &[f32]| {
-            let mut mean = vec![0.0_f64; area];
-            for channel in slice.chunks_exact(area) {
-                for (sum, &value) in mean.iter_mut().zip(channel) {
-                    *sum += f64::from(value) / self.shape.channels as f64;
-                }
-            }
-            let whole = mean.iter().sum::<f64>() / area as f64;
-            let floor = if whole > 0.0 {
-                LEAST_LUMINANCE * whole
-            } else {
-                1.0
-            };
-            mean.into_iter().map(move |value| value.max(floor) as f32)
-        };
-        slices.flat_map(mean).collect()
     }
 }
 
@@ -424,7 +388,11 @@ fn fields(
             facets.sigma.numbers.clone(),
         ),
         floats("vndf", by_slice(shape.visible), tables.vndf.clone()),
-        floats("luminance", by_slice(shape.values), tables.luminance()),
+        floats(
+            "luminance",
+            by_slice(shape.values),
+            tables.luminance.clone(),
+        ),
         floats(
             name,
             vec![phi, theta, shape.channels, side, side],
