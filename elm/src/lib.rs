@@ -63,6 +63,9 @@ pub mod cross_validation;
 mod dataset;
 mod error;
 mod feature_map;
+#[cfg(debug_assertions)]
+#[doc(hidden)]
+pub mod instances;
 mod linalg;
 mod memory;
 pub mod metrics;
