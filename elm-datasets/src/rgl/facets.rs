@@ -135,10 +135,12 @@ impl Facets {
     }
 }
 
-/// A value that a table can hold: what is no number, infinite or negative is black.
+/// A value that a table can hold: what is no number, infinite or negative is black, and nothing so large that
+/// single precision has no room for what is computed of it.
 pub(super) fn safe(value: f64) -> f64 {
+    const LARGEST: f64 = 1e30;
     if value.is_finite() {
-        value.max(0.0)
+        value.clamp(0.0, LARGEST)
     } else {
         0.0
     }

@@ -224,7 +224,7 @@ fn spectra_are_what_pbrt_demands_of_isotropic_and_brushed_and_black_materials() 
         if pair.incident[0] > 0.5 {
             f64::NAN
         } else {
-            -1.0 + 1e9 * pair.outgoing[1]
+            -1.0 + 1e300 * pair.outgoing[1]
         }
     };
     for model in [
