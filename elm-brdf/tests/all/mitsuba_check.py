@@ -84,7 +84,9 @@ def furnace(material, what, bsdf):
     # Off the outermost ring, which sees the environment, too.
     radius = np.hypot(*np.meshgrid(centre, centre))
     inner = radius < 0.97
-    rings = [(a, b) for a, b in zip(np.linspace(0, 0.97, 9), np.linspace(0, 0.97, 9)[1:])]
+    # Two pixels wide: the albedo changes along the radius, too.
+    ends = np.linspace(0, 0.97, 25)
+    rings = list(zip(ends, ends[1:]))
     largest, least = 0.0, np.inf
     for a, b in rings:
         ring = picture[(radius >= a) & (radius < b)]
