@@ -9,7 +9,6 @@ use ndarray::{Array1, Array2, Ix1};
 use crate::{Accumulator, Dataset, Elm, ElmParams, Result, TargetDim};
 
 /// A use of each verb. Nobody calls it.
-#[doc(hidden)]
 pub fn instances(
     x: &Array2<f64>,
     one: &Array1<f64>,

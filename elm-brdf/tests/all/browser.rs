@@ -4,6 +4,8 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use serde_json::Value;
+
 /// Opens a file, with what may follow its name, and returns what the page says on its console, up
 /// to the first message that is `last`. Errors of the page are messages as well.
 pub(crate) fn console(chromium: &Path, page: &Path, suffix: &str, last: &str) -> Vec<String> {
@@ -57,4 +59,37 @@ pub(crate) fn console(chromium: &Path, page: &Path, suffix: &str, last: &str) ->
     let _ = browser.kill();
     browser.wait().unwrap();
     messages
+}
+
+/// What shaders compute of pairs of vectors, by `language name`: `shaders.html` runs these jobs.
+pub(crate) fn shader_values(
+    chromium: &Path,
+    jobs: &[Value],
+    pairs: &[[[f64; 3]; 2]],
+) -> Vec<(String, Vec<[f64; 3]>)> {
+    let data = serde_json::json!({ "jobs": jobs, "pairs": pairs });
+    let page = include_str!("shaders.html").replace("DATA", &data.to_string());
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("shaders.html");
+    std::fs::write(&file, page).unwrap();
+
+    let mut found: Vec<(String, Vec<[f64; 3]>)> = Vec::new();
+    for message in console(chromium, &file, "", "done") {
+        match message.split_once(' ') {
+            // One message a block of values.
+            Some(("values", rest)) => {
+                let mut words = rest.split(' ');
+                let label = format!("{} {}", words.next().unwrap(), words.next().unwrap());
+                let numbers: Vec<f64> = words.map(|n| n.parse().unwrap()).collect();
+                let rows = numbers.as_chunks::<3>().0;
+                match found.last_mut() {
+                    Some((last, values)) if *last == label => values.extend(rows),
+                    _ => found.push((label, rows.to_vec())),
+                }
+            }
+            Some(("skipped", why)) => elm_test_support::skip(why),
+            _ => assert_eq!(message, "done", "the page reports an error"),
+        }
+    }
+    found
 }

@@ -9,13 +9,8 @@ use crate::support::Program;
 use elm_datasets::{Invalid, MaterialId, curet, synthetic};
 
 fn refused(arguments: &[&str], code: i32, expected: &[&str]) {
-    let assert = Program::new()
-        .command()
-        .args(arguments)
-        .assert()
-        .code(code)
-        .stdout("");
-    let line = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+    let (line, found) = Program::new().refusal(arguments);
+    assert_eq!(found, code, "{arguments:?}: {line}");
     assert_eq!(line.lines().count(), 1, "{arguments:?}: {line}");
     assert!(line.starts_with("error: "), "{arguments:?}: {line}");
     for text in expected {

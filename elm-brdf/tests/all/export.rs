@@ -9,6 +9,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use crate::browser::shader_values;
 use crate::exports::{check, directions, models, network, samples};
 use elm::{Activation, ElmParams};
 use elm_brdf::export::{ExportError, Format, Language, merl, source};
@@ -224,31 +225,7 @@ fn shaders_run_in_a_browser_agree_with_the_model() {
         jobs.push(serde_json::json!({ "language": "hlsl", "name": name, "text": text }));
     }
     let corners: Vec<[[f64; 3]; 2]> = pairs.iter().map(|p| [p.incident, p.outgoing]).collect();
-    let data = serde_json::json!({ "jobs": jobs, "pairs": corners });
-    let page = include_str!("shaders.html").replace("DATA", &data.to_string());
-    let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("shaders.html");
-    std::fs::write(&file, page).unwrap();
-
-    let mut found: Vec<(String, Vec<[f64; 3]>)> = Vec::new();
-    for message in crate::browser::console(&chromium, &file, "", "done") {
-        match message.split_once(' ') {
-            // One message a block of values.
-            Some(("values", rest)) => {
-                let mut words = rest.split(' ');
-                let (language, name) = (words.next().unwrap(), words.next().unwrap());
-                let numbers: Vec<f64> = words.map(|n| n.parse().unwrap()).collect();
-                let rows = numbers.as_chunks::<3>().0;
-                let label = format!("{language} {name}");
-                match found.last_mut() {
-                    Some((last, values)) if *last == label => values.extend(rows),
-                    _ => found.push((label, rows.to_vec())),
-                }
-            }
-            Some(("skipped", why)) => elm_test_support::skip(why),
-            _ => assert_eq!(message, "done", "the page reports an error"),
-        }
-    }
+    let found = shader_values(&chromium, &jobs, &corners);
     let mut compared = 0;
     for (name, model) in models() {
         for language in ["glsl", "wgsl", "hlsl"] {

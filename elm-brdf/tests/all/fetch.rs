@@ -352,13 +352,8 @@ fn the_command_says_in_one_line_what_is_wrong() {
             ["SHA-256", "--accept-changed"],
         ),
     ] {
-        let assert = Program::new()
-            .command()
-            .args(arguments)
-            .assert()
-            .code(code)
-            .stdout("");
-        let line = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+        let (line, found) = Program::new().refusal(arguments);
+        assert_eq!(found, code, "{arguments:?}: {line}");
         assert_eq!(line.lines().count(), 1, "{line}");
         for fragment in fragments {
             assert!(line.contains(fragment), "{arguments:?}: {line}");

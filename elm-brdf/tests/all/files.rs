@@ -47,13 +47,7 @@ fn an_exact_export_of_a_table_is_the_table_and_anything_else_is_refused() {
     ] {
         let to = dir.path().join(to);
         let command = ["export", from, "-o", to.to_str().unwrap(), "--exact"];
-        let assert = program
-            .command()
-            .args(command)
-            .assert()
-            .failure()
-            .stdout("");
-        let said = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+        let (said, _) = program.refusal(&command);
         assert!(said.contains(word) && said.lines().count() == 1, "{said}");
         assert!(!to.exists());
     }

@@ -15,8 +15,7 @@ use elm_brdf::export::{bsdf, plugin};
 use elm_brdf::features::Features;
 use elm_brdf::metrics::Metrics;
 use elm_brdf::model::{BrdfModel, BrdfParams, Tuned};
-use elm_brdf::render::{Options as RenderOptions, Rendering, render};
-use elm_brdf::scene_materials::{Scene, SceneMaterialLoader};
+use elm_brdf::render::Rendering;
 use elm_brdf::target_transform::TargetTransform;
 use elm_datasets::geometry::{DirectionPair, cartesian, reflect};
 use elm_datasets::scattered::{self, Options};
@@ -25,6 +24,8 @@ use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
+
+use crate::rgl_spheres::sphere;
 
 /// Half of them anywhere, half near the mirror direction.
 fn pairs(count: usize, seed: u64) -> Vec<DirectionPair> {
@@ -62,35 +63,6 @@ fn fitted(features: Features, formula: impl Fn(&DirectionPair) -> f64) -> BrdfMo
     params.fit_model(&pairs, values.view()).unwrap()
 }
 
-/// The sphere of the references, an evaluation at the centre of each pixel, as OpenEXR.
-fn lit_sphere(dir: &Path, name: &str) -> Vec<u8> {
-    let text = format!(
-        "[image]
-width = 256
-height = 256
-samples = 1
-[camera]
-position = [0, 0, 5]
-target = [0, 0, 0]
-height = 2
-[material.m]
-model = '{name}.elm'
-[[sphere]]
-center = [0, 0, 0]
-radius = 1
-material = 'm'
-[[directional]]
-towards = [-1, 1, 1]
-irradiance = [1, 1, 1]
-"
-    );
-    let scene = Scene::parse(&text, &dir.join("scene.toml")).unwrap();
-    let library = SceneMaterialLoader::new(None);
-    let picture = render(&scene, &library, RenderOptions::default(), &|_, _| {}).unwrap();
-    let format = Rendering::format(Path::new("x.exr")).unwrap();
-    picture.encode(format).unwrap()
-}
-
 /// What Mitsuba says of each material, a value of JSON for each figure.
 fn asked(python: &Path, materials: &[(String, BrdfModel)], data: Option<&Path>) -> Vec<Value> {
     let dir = tempfile::tempdir().unwrap();
@@ -123,12 +95,15 @@ fn asked(python: &Path, materials: &[(String, BrdfModel)], data: Option<&Path>) 
             let _ = writeln!(text, "{}", numbers.join(","));
         }
         std::fs::write(path(name, ".csv"), text).unwrap();
-        if let Some(sphere) = data.map(|data| data.join(format!("{name}_rgb_sphere.exr")))
-            && sphere.is_file()
+        if let Some(reference) = data.map(|data| data.join(format!("{name}_rgb_sphere.exr")))
+            && reference.is_file()
         {
-            std::fs::copy(sphere, path(name, "_sphere.exr")).unwrap();
+            std::fs::copy(reference, path(name, "_sphere.exr")).unwrap();
             model.save(path(name, ".elm")).unwrap();
-            std::fs::write(path(name, "_ours.exr"), lit_sphere(dir.path(), name)).unwrap();
+            let ours = sphere(dir.path(), &format!("model = '{name}.elm'"));
+            let file = path(name, "_ours.exr");
+            let format = Rendering::format(&file).unwrap();
+            std::fs::write(file, ours.encode(format).unwrap()).unwrap();
         }
     }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/all/mitsuba_check.py");

@@ -115,13 +115,7 @@ fn what_cannot_be_predicted_is_one_line_and_leaves_no_file() {
         fs::write(&asked, text).unwrap();
         let paths = [&model, &asked, &out].map(|path| path.to_str().unwrap());
         let command = ["predict", paths[0], paths[1], "-o", paths[2]];
-        let assert = program
-            .command()
-            .args(command)
-            .assert()
-            .failure()
-            .stdout("");
-        let said = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+        let (said, _) = program.refusal(&command);
         let errors = said.lines().filter(|line| line.starts_with("error: "));
         assert!(errors.count() == 1 && said.contains(word), "{said}");
         assert!(!out.exists());

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use elm_brdf::render::{Options, render};
+use elm_brdf::render::{Options, Rendering, render};
 use elm_brdf::scene_materials::{Scene, SceneMaterialLoader};
 
 /// Luminance of linear sRGB.
@@ -48,7 +48,8 @@ fn psnr(picture: &[[f64; 3]], reference: &[[f64; 3]]) -> f64 {
     -10.0 * (sum / count).log10()
 }
 
-fn sphere(data: &Path, material: &str, fit: &str) -> Vec<[f64; 3]> {
+/// The sphere of the references, of a material in this folder, an evaluation at the centre of each pixel.
+pub(crate) fn sphere(folder: &Path, material: &str) -> Rendering {
     let text = format!(
         "[image]
 width = 256
@@ -59,8 +60,7 @@ position = [0, 0, 5]
 target = [0, 0, 0]
 height = 2
 [material.m]
-csv = '{material}_train.csv'
-{fit}
+{material}
 [[sphere]]
 center = [0, 0, 0]
 radius = 1
@@ -70,11 +70,9 @@ towards = [-1, 1, 1]
 irradiance = [1, 1, 1]
 "
     );
-    let scene = Scene::parse(&text, &data.join("scene.toml")).unwrap();
+    let scene = Scene::parse(&text, &folder.join("scene.toml")).unwrap();
     let library = SceneMaterialLoader::new(None);
-    render(&scene, &library, Options::default(), &|_, _| {})
-        .unwrap()
-        .pixels
+    render(&scene, &library, Options::default(), &|_, _| {}).unwrap()
 }
 
 #[test]
@@ -95,7 +93,10 @@ fn learnt_spheres_look_more_like_the_measured_ones_than_nbrdfs() {
             .pixels()
             .map(|p| p.0.map(f64::from))
             .collect();
-        let score = |fit: &str| psnr(&sphere(&data, material, fit), &reference);
+        let score = |fit: &str| {
+            let subject = format!("csv = '{material}_train.csv'\n{fit}");
+            psnr(&sphere(&data, &subject).pixels, &reference)
+        };
         let (large, small) = (score("neurons = 256"), score("neurons = 64"));
         let ggx = score("fit = 'ggx+lambert'");
         println!(

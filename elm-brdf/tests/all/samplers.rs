@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::fmt::Write as _;
 use std::process::Command;
 
+use crate::browser::shader_values;
 use crate::exports::network;
 use elm::Activation;
 use elm_brdf::export::{Language, header, source};
@@ -368,29 +369,7 @@ fn shaders_in_a_browser_draw_by_their_densities() {
             [viewer, [random.random(), random.random(), 0.0]]
         })
         .collect();
-    let data = serde_json::json!({ "jobs": jobs, "pairs": corners });
-    let page = include_str!("shaders.html").replace("DATA", &data.to_string());
-    let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("shaders.html");
-    std::fs::write(&file, page).unwrap();
-
-    let mut found: Vec<(String, Vec<[f64; 3]>)> = Vec::new();
-    for message in crate::browser::console(&chromium, &file, "", "done") {
-        match message.split_once(' ') {
-            Some(("values", rest)) => {
-                let mut words = rest.split(' ');
-                let label = format!("{} {}", words.next().unwrap(), words.next().unwrap());
-                let numbers: Vec<f64> = words.map(|n| n.parse().unwrap()).collect();
-                let rows = numbers.as_chunks::<3>().0;
-                match found.last_mut() {
-                    Some((last, values)) if *last == label => values.extend(rows),
-                    _ => found.push((label, rows.to_vec())),
-                }
-            }
-            Some(("skipped", why)) => elm_test_support::skip(why),
-            _ => assert_eq!(message, "done", "the page reports an error"),
-        }
-    }
+    let found = shader_values(&chromium, &jobs, &corners);
     let values = |label: &str| {
         found
             .iter()

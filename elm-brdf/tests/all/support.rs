@@ -46,6 +46,15 @@ impl Program {
         self.home.path().join("cache")
     }
 
+    /// What a run with these arguments that fails says on standard error, with nothing on standard output,
+    /// and its exit code.
+    pub(crate) fn refusal(&self, arguments: &[&str]) -> (String, i32) {
+        let assert = self.command().args(arguments).assert().failure().stdout("");
+        let output = assert.get_output();
+        let said = String::from_utf8(output.stderr.clone()).unwrap();
+        (said, output.status.code().unwrap())
+    }
+
     /// Standard output of a successful run with these arguments.
     pub(crate) fn output(&self, arguments: &[&str]) -> String {
         let assert = self.command().args(arguments).assert().success().stderr("");

@@ -16,7 +16,7 @@ pub(super) struct Points {
     pub(super) pairs: Vec<DirectionPair>,
     /// What a table has, over the BRDF.
     pub(super) scales: Vec<f64>,
-    /// The projected solid angle of the viewer over the area of the table, but for a factor of all points.
+    /// The projected solid angle of the viewer over the area of the table.
     angles: Vec<f64>,
 }
 

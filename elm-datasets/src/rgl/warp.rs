@@ -75,8 +75,13 @@ impl Size {
 
     /// The bilinear interpolant of a table at a point of the unit square.
     pub(super) fn interpolate(self, table: &[f32], point: [f64; 2]) -> f64 {
+        self.bilinear(point, |index| number(table, index))
+    }
+
+    /// As [`interpolate`](Self::interpolate), of numbers by their place in a table.
+    fn bilinear(self, point: [f64; 2], number: impl Fn(usize) -> f64) -> f64 {
         let Place { column, row, x, y } = self.place(point);
-        let at = |c: usize, r: usize| number(table, (row + r) * self.width + column + c);
+        let at = |c: usize, r: usize| number((row + r) * self.width + column + c);
         mix(y, mix(x, at(0, 0), at(1, 0)), mix(x, at(0, 1), at(1, 1)))
     }
 }
@@ -201,14 +206,11 @@ impl Warp {
 
     /// The density of a slice at a point, with integral 1.
     pub(super) fn density(&self, slice: usize, point: [f64; 2]) -> f64 {
-        let Place { column, row, x, y } = self.size.place(point);
-        let (width, height) = (self.size.width, self.size.height);
-        let at = |c: usize, r: usize| {
-            let index = (slice * height + row + r) * width + column + c;
-            self.density.get(index).copied().unwrap_or(f64::NAN)
-        };
-        let cells = ((width - 1) * (height - 1)) as f64;
-        cells * mix(y, mix(x, at(0, 0), at(1, 0)), mix(x, at(0, 1), at(1, 1)))
+        let begin = slice * self.size.area();
+        let density = self.density.get(begin..).unwrap_or_default();
+        let cells = (self.size.width - 1) * (self.size.height - 1);
+        let number = |index: usize| density.get(index).copied().unwrap_or(f64::NAN);
+        cells as f64 * self.size.bilinear(point, number)
     }
 
     /// Which point of the unit square [`flatten`](Self::flatten) takes to this one, under one slice's
