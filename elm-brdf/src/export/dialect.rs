@@ -101,8 +101,9 @@ impl Language {
         }
     }
 
-    /// A number so that reading it gives the same bits.
-    pub(super) fn literal(self, value: f32) -> String {
+    /// A number in single precision, so that reading it gives the same bits.
+    pub(super) fn literal(self, value: f64) -> String {
+        let value = value as f32;
         match self {
             Self::C => format!("{value:?}f"),
             _ => format!("{value:?}"),

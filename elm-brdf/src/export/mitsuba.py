@@ -9,7 +9,9 @@ weights and its sampler are all in this file:
     scene = mi.load_dict({'type': 'scene', ..., 'sphere': {'type': 'sphere', 'bsdf': {'type': '@NAME@'}}})
 
 It runs in every variant that knows no polarisation. Scalar variants interpret it neuron by neuron: use an LLVM
-or CUDA variant for pictures. si.wi is the viewer and wo the light, as in a path that begins at the camera; the
+or CUDA variant for pictures. The network is evaluated in double precision, on CUDA in single; 'double': True or False
+beside 'type' says otherwise. In single precision weights that nearly cancel cost digits: values err by some @SINGLE@
+of their root mean square. si.wi is the viewer and wo the light, as in a path that begins at the camera; the
 surface is black from below: wrap it in 'twosided' for both sides. @GRAIN@Values are those of
 the model, in 1/sr, and times the cosine of wo, as Mitsuba has it. mi.traverse(bsdf) lists the weights, which
 are differentiable: 'neurons' (a row for each: @ROW@),
@@ -179,7 +181,9 @@ def make():
             flags = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide@ANISOTROPIC@
             self.m_components = [flags]
             self.m_flags = flags
-            tensor = lambda rows: mi.TensorXf([v for row in rows for v in row], (len(rows), len(rows[0])))
+            self.double = props.get('double', 'cuda' not in mi.variant())
+            kind = mi.TensorXd if self.double else mi.TensorXf
+            tensor = lambda rows: kind([v for row in rows for v in row], (len(rows), len(rows[0])))
             self.neurons = tensor(NEURONS)
             self.linear = tensor(LINEAR)
             self.constant = tensor([CONSTANT])
@@ -193,11 +197,14 @@ def make():
 
         def values(self, light, viewer):
             """BRDF in 1/sr, by output."""
+            number = mi.Float64 if self.double else mi.Float
+            if self.double:
+                light, viewer = mi.Vector3d(light), mi.Vector3d(viewer)
             x = inputs(light, viewer)
             outputs, stride = len(CONSTANT), INPUTS + 1 + len(CONSTANT)
             table, linear, constant = self.neurons.array, self.linear.array, self.constant.array
             is_jit = dr.is_jit_v(mi.Float)
-            read = (lambda array, index: dr.gather(mi.Float, array, index)) if is_jit else (lambda array, index: array[index])
+            read = (lambda array, index: dr.gather(number, array, index)) if is_jit else (lambda array, index: array[index])
             zero = x[0] * 0
             sums = [
                 zero + read(constant, c) + sum(x[i] * read(linear, c * INPUTS + i) for i in range(INPUTS))
@@ -225,7 +232,7 @@ def make():
                 else:
                     for k in range(first, last):
                         sums = add(k, sums, function, scales)
-            return [self.value(t, *target) for t, target in zip(sums, TARGETS)]
+            return [mi.Float(self.value(t, *target)) for t, target in zip(sums, TARGETS)]
 
         def value(self, t, kind, offset, ceiling):
             if kind == 'log':

@@ -1,6 +1,6 @@
 //! A model as a plug-in for Mitsuba 3: one file of Python, with the network and its sampler inside.
 
-use std::fmt::Write;
+use std::fmt::{Debug, Write};
 
 use elm_datasets::Brdf;
 use elm_datasets::mixture::{Lobe, LobeMixture};
@@ -46,6 +46,9 @@ const TAKEN: [&str; 24] = [
 
 /// The source of the plug-in, to be called by the file's `module` name and registered as `name`.
 ///
+/// Weights are in double precision, and so is the evaluation unless a scene asks for single (on CUDA the
+/// other way round).
+///
 /// In variants without wavelengths a spectrum is integrated to linear sRGB under D65; in spectral ones red,
 /// green and blue are [spectra](super::PRIMARIES) that integrate to them.
 ///
@@ -65,7 +68,7 @@ pub fn plugin(model: &BrdfModel, module: &str, name: &str) -> Result<String> {
         1 => (Channels::Rgb, vec![0]),
         _ => spectrum::channels(&model.provenance().channels, count)?,
     };
-    super::check_precision(model)?;
+    let cost = super::check_precision(model)?;
     let mut network = Network::new(model)?;
     network.select(model.target_transform(), &places)?;
     let mixture = LobeMixture::of(model)?;
@@ -84,6 +87,7 @@ pub fn plugin(model: &BrdfModel, module: &str, name: &str) -> Result<String> {
             grained("The grain\ncounts from the tangent dp/du. "),
         ),
         ("@ROW@", row.to_owned()),
+        ("@SINGLE@", format!("{:.0e}", cost.rmse / cost.scale)),
         (
             "@CHANNELS@",
             match &channels {
@@ -172,12 +176,12 @@ fn formulas(network: &Network) -> Result<(String, String), ExportError> {
     Ok((locals, expressions.join(", ")))
 }
 
-fn list(numbers: &[f32]) -> String {
+fn list(numbers: &[impl Debug]) -> String {
     let numbers: Vec<String> = numbers.iter().map(|number| format!("{number:?}")).collect();
     format!("[{}]", numbers.join(", "))
 }
 
-fn rows(rows: impl Iterator<Item = Vec<f32>>) -> String {
+fn rows(rows: impl Iterator<Item = Vec<f64>>) -> String {
     let rows: String = rows.map(|row| format!("    {},\n", list(&row))).collect();
     format!("[\n{rows}]")
 }
@@ -204,7 +208,7 @@ fn neurons(network: &Network) -> String {
     let row = |neuron: &Neuron| {
         let weights = neuron.center.as_ref().unwrap_or(&neuron.weights).iter();
         let row = weights.chain([&neuron.bias]).chain(&neuron.beta);
-        row.copied().collect::<Vec<f32>>()
+        row.copied().collect::<Vec<f64>>()
     };
     if network.neurons.is_empty() {
         // Tensors have at least one row.
@@ -215,7 +219,7 @@ fn neurons(network: &Network) -> String {
 }
 
 fn targets(network: &Network) -> String {
-    let number = |value: f64| format!("{:?}", (value as f32).min(f32::MAX));
+    let number = |value: f64| format!("{:?}", value.min(f64::from(f32::MAX)));
     // What has been selected has a value for each output.
     let Values::Direct(transforms) = &network.values else {
         return "[]".to_owned();

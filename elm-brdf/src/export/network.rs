@@ -1,5 +1,5 @@
 //! A network as exports need it: standardisation folded into the weights, neurons in order of their
-//! functions, single precision.
+//! functions, all numbers in the range of single precision.
 
 use super::error::ExportError;
 use crate::features::Features;
@@ -36,11 +36,11 @@ impl Values {
 /// A wavelength of a spectrum.
 pub(super) struct Wavelength {
     /// Its target where all outputs are 0, and what each output adds.
-    pub(super) mean: f32,
-    pub(super) axes: Vec<f32>,
+    pub(super) mean: f64,
+    pub(super) axes: Vec<f64>,
     pub(super) transform: Channel,
     /// What its value adds to red, green and blue.
-    pub(super) color: [f32; 3],
+    pub(super) color: [f64; 3],
 }
 
 /// A neuron: its function of the weighted sum of the inputs, or of the distance of the weighted
@@ -48,12 +48,12 @@ pub(super) struct Wavelength {
 pub(super) struct Neuron {
     /// Name of the function.
     pub(super) activation: String,
-    pub(super) weights: Vec<f32>,
-    pub(super) bias: f32,
+    pub(super) weights: Vec<f64>,
+    pub(super) bias: f64,
     /// In weighted inputs; `None` where the function is of the sum.
-    pub(super) center: Option<Vec<f32>>,
+    pub(super) center: Option<Vec<f64>>,
     /// Output weights.
-    pub(super) beta: Vec<f32>,
+    pub(super) beta: Vec<f64>,
 }
 
 impl Neuron {
@@ -68,9 +68,9 @@ impl Neuron {
 
 /// An output.
 pub(super) struct Output {
-    pub(super) constant: f32,
+    pub(super) constant: f64,
     /// Weights of the inputs themselves.
-    pub(super) linear: Vec<f32>,
+    pub(super) linear: Vec<f64>,
 }
 
 /// Takes weights of standardised inputs to weights of the inputs as they come.
@@ -151,10 +151,10 @@ impl Network {
                 let (weights, center) = scaling.radial(&scales.to_vec(), &own);
                 neurons.push(Neuron {
                     activation: activation.to_owned(),
-                    center: Some(singles("a center", &center)?),
-                    weights: singles("a scale", &weights)?,
+                    center: Some(in_range("a center", center)?),
+                    weights: in_range("a scale", weights)?,
                     bias: 0.0,
-                    beta: singles("an output weight", &betas)?,
+                    beta: in_range("an output weight", betas)?,
                 });
                 continue;
             }
@@ -166,10 +166,10 @@ impl Network {
             }
             neurons.push(Neuron {
                 activation: activation.to_owned(),
-                weights: singles("a hidden weight", &weights)?,
-                bias: single("a hidden bias", bias)?,
+                weights: in_range("a hidden weight", weights)?,
+                bias: number("a hidden bias", bias)?,
                 center: None,
-                beta: singles("an output weight", &betas)?,
+                beta: in_range("an output weight", betas)?,
             });
         }
         // With direct links the inputs' rows follow the neurons'.
@@ -191,8 +191,8 @@ impl Network {
             outputs: outputs
                 .map(|(constant, linear)| {
                     Ok(Output {
-                        constant: single("an intercept", constant)?,
-                        linear: singles("a direct link", &linear)?,
+                        constant: number("an intercept", constant)?,
+                        linear: in_range("a direct link", linear)?,
                     })
                 })
                 .collect::<Result<_, ExportError>>()?,
@@ -215,30 +215,28 @@ impl Network {
         };
         let mean = |place: usize| transform.basis().map_or(0.0, |basis| basis.mean()[place]);
         let of_channels =
-            |outputs: Vec<f64>| places.iter().map(|&p| weights(&outputs, p)).collect();
-        let doubles = |singles: &[f32]| singles.iter().map(|&s| f64::from(s)).collect::<Vec<f64>>();
+            |outputs: &[f64]| -> Vec<f64> { places.iter().map(|&p| weights(outputs, p)).collect() };
         for neuron in &mut self.neurons {
-            let beta: Vec<f64> = of_channels(doubles(&neuron.beta));
-            neuron.beta = singles("an output weight", &beta)?;
+            let beta = of_channels(&neuron.beta);
+            neuron.beta = in_range("an output weight", beta)?;
         }
-        let constants: Vec<f32> = self.outputs.iter().map(|output| output.constant).collect();
-        let constants: Vec<f64> = of_channels(doubles(&constants));
+        let constants: Vec<f64> = self.outputs.iter().map(|output| output.constant).collect();
+        let constants = of_channels(&constants);
         let mut linear = vec![vec![0.0; self.inputs.len()]; places.len()];
         for input in 0..self.inputs.len() {
-            let own: Vec<f32> = self.outputs.iter().map(|o| o.linear[input]).collect();
-            let own: Vec<f64> = of_channels(doubles(&own));
-            for (row, weight) in linear.iter_mut().zip(own) {
+            let own: Vec<f64> = self.outputs.iter().map(|o| o.linear[input]).collect();
+            for (row, weight) in linear.iter_mut().zip(of_channels(&own)) {
                 row[input] = weight;
             }
         }
         self.outputs = places
             .iter()
             .zip(constants)
-            .zip(&linear)
+            .zip(linear)
             .map(|((&place, constant), linear)| {
                 Ok(Output {
-                    constant: single("an intercept", constant + mean(place))?,
-                    linear: singles("a direct link", linear)?,
+                    constant: number("an intercept", constant + mean(place))?,
+                    linear: in_range("a direct link", linear)?,
                 })
             })
             .collect::<Result<_, ExportError>>()?;
@@ -265,13 +263,13 @@ fn values(model: &BrdfModel) -> Result<Values, ExportError> {
         };
         let [r, g, b] = *color;
         Ok(Wavelength {
-            mean: single("a mean target", mean)?,
-            axes: singles("an axis", &axes)?,
+            mean: number("a mean target", mean)?,
+            axes: in_range("an axis", axes)?,
             transform: of_channel,
             color: [
-                single("a colour", r)?,
-                single("a colour", g)?,
-                single("a colour", b)?,
+                number("a colour", r)?,
+                number("a colour", g)?,
+                number("a colour", b)?,
             ],
         })
     };
@@ -293,16 +291,18 @@ fn turned(features: Features, mut weights: Vec<f64>) -> Vec<f64> {
     weights
 }
 
-/// Rounded to single precision, if it has the range.
-fn single(what: &'static str, value: f64) -> Result<f32, ExportError> {
-    let rounded = value as f32;
-    if rounded.is_finite() {
-        Ok(rounded)
+/// The number, if single precision has its range.
+fn number(what: &'static str, value: f64) -> Result<f64, ExportError> {
+    if (value as f32).is_finite() {
+        Ok(value)
     } else {
         Err(ExportError::Single { what, value })
     }
 }
 
-fn singles(what: &'static str, values: &[f64]) -> Result<Vec<f32>, ExportError> {
-    values.iter().map(|&value| single(what, value)).collect()
+fn in_range(what: &'static str, values: Vec<f64>) -> Result<Vec<f64>, ExportError> {
+    for &value in &values {
+        number(what, value)?;
+    }
+    Ok(values)
 }

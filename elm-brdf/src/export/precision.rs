@@ -74,12 +74,13 @@ impl BrdfModel {
             let of_neurons = neurons(&network.neurons, &functions, &x);
             for (channel, output) in network.outputs.iter().enumerate() {
                 let mut sum = Sum::default();
-                sum.add(output.constant, f64::from(output.constant.abs()));
-                for (weight, x) in output.linear.iter().zip(&x) {
-                    sum.add(weight * x, f64::from((weight * x).abs()));
+                sum.add(output.constant as f32, output.constant.abs());
+                for (&weight, x) in output.linear.iter().zip(&x) {
+                    let term = weight as f32 * x;
+                    sum.add(term, f64::from(term.abs()));
                 }
                 for (neuron, (h, off)) in network.neurons.iter().zip(&of_neurons) {
-                    let beta = neuron.beta[channel];
+                    let beta = neuron.beta[channel] as f32;
                     sum.add(beta * h, f64::from(beta.abs()) * off);
                 }
                 single[[row, channel]] = f64::from(sum.total);
@@ -202,21 +203,23 @@ fn functions(network: &Network) -> Result<Vec<Activation<f32>>, ExportError> {
 /// The value of each neuron in single precision, and by how many roundings it is off.
 fn neurons(neurons: &[Neuron], functions: &[Activation<f32>], x: &[f32]) -> Vec<(f32, f64)> {
     let one = |(neuron, function): (&Neuron, &Activation<f32>)| {
-        let (mut z, mut size) = (neuron.bias, f64::from(neuron.bias.abs()));
+        let (mut z, mut size) = (neuron.bias as f32, neuron.bias.abs());
         match &neuron.center {
             Some(center) => {
-                for ((weight, x), center) in neuron.weights.iter().zip(x).zip(center) {
-                    let part = weight * x - center;
+                for ((&weight, x), &center) in neuron.weights.iter().zip(x).zip(center) {
+                    let (scaled, center) = (weight as f32 * x, center as f32);
+                    let part = scaled - center;
                     z += part * part;
                     // A distance moves by no more than what it is the length of.
-                    size += f64::from((weight * x).abs() + center.abs());
+                    size += f64::from(scaled.abs() + center.abs());
                 }
                 z = z.sqrt();
             }
             None => {
-                for (weight, x) in neuron.weights.iter().zip(x) {
-                    z += weight * x;
-                    size += f64::from((weight * x).abs());
+                for (&weight, x) in neuron.weights.iter().zip(x) {
+                    let term = weight as f32 * x;
+                    z += term;
+                    size += f64::from(term.abs());
                 }
             }
         }

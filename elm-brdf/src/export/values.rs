@@ -99,7 +99,7 @@ impl Writer<'_> {
     fn four_wavelengths(&mut self, count: usize, part: &[Wavelength]) {
         let (language, kind) = (self.language, self.language.four());
         // Missing wavelengths of the last four have no color.
-        let four = |value: &dyn Fn(&Wavelength) -> f32| {
+        let four = |value: &dyn Fn(&Wavelength) -> f64| {
             let parts = (0..4).map(|n| language.literal(part.get(n).map_or(0.0, value)));
             format!("{kind}({})", parts.collect::<Vec<_>>().join(", "))
         };
@@ -186,8 +186,8 @@ impl Writer<'_> {
 }
 
 /// Offset and ceiling of a transform, 0 where it has none.
-fn range(transform: Channel) -> (f32, f32) {
-    let single = |value: f64| (value as f32).min(f32::MAX);
+fn range(transform: Channel) -> (f64, f64) {
+    let single = |value: f64| value.min(f64::from(f32::MAX));
     match transform {
         Channel::Identity => (0.0, 0.0),
         Channel::Log { offset, ceiling } => (single(offset), single(ceiling)),

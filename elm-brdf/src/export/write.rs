@@ -296,7 +296,7 @@ impl<'a> Writer<'a> {
             });
         }
         // Missing neurons of the last four have no weight.
-        let four = |value: &dyn Fn(&Neuron) -> f32, neurons: &[Neuron]| {
+        let four = |value: &dyn Fn(&Neuron) -> f64, neurons: &[Neuron]| {
             let parts = (0..4).map(|n| language.literal(neurons.get(n).map_or(0.0, value)));
             format!(
                 "{}({})",
@@ -338,8 +338,8 @@ impl<'a> Writer<'a> {
 
     /// The weights as tables, for C.
     fn tables(&mut self) {
-        let rows = |values: &[Vec<f32>]| -> String {
-            let row = |row: &Vec<f32>| {
+        let rows = |values: &[Vec<f64>]| -> String {
+            let row = |row: &Vec<f64>| {
                 let numbers: Vec<String> = row.iter().map(|&v| Language::C.literal(v)).collect();
                 format!("    {{{}}},\n", numbers.join(", "))
             };
@@ -356,7 +356,7 @@ impl<'a> Writer<'a> {
             return;
         }
         // One row per neuron: its weights or its center, its bias, its output weights.
-        let table: Vec<Vec<f32>> = neurons
+        let table: Vec<Vec<f64>> = neurons
             .iter()
             .map(|n| {
                 let bias = std::iter::once(&n.bias);

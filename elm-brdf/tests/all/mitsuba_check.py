@@ -144,10 +144,11 @@ def main(folder, names):
         found = values(load(file), light, viewer)
         difference = np.abs(np.log1p(found * viewer[:, 2:]) - np.log1p(expected * viewer[:, 2:])).mean()
         say(material=name, what='measured values', log_cosine=float(difference), rows=len(rows))
-        found = values(load(plugin), viewer, light)
-        relative = np.abs(found - expected) / (expected + 1e-3)
-        say(material=name, what='elm values', relative=float(relative.max()), mean=float(relative.mean()),
-            rms=float(np.sqrt(np.square(found - expected).mean() / np.square(expected).mean())))
+        for what, double in (('elm values', {}), ('elm values, single', {'double': False})):
+            found = values(load({**plugin, **double}), viewer, light)
+            relative = np.abs(found - expected) / (expected + 1e-3)
+            say(material=name, what=what, relative=float(relative.max()), mean=float(relative.mean()),
+                rms=float(np.sqrt(np.square(found - expected).mean() / np.square(expected).mean())))
         descriptions = (('measured', file), ('elm', plugin))
         for what, bsdf in descriptions:
             chi_square(name, what, bsdf)
