@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{failed, unplanned};
 
 /// More arguments than this are refused: a row of them would not fit a layer of neurons either.
-const MOST_ARGUMENTS: usize = 10_000;
+const MAX_ARGUMENTS: usize = 10_000;
 
 /// What becomes of rows that have a NULL among the arguments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -31,9 +31,9 @@ pub(crate) struct Rows {
 
 /// Whether all arguments are numbers, and what they are to be converted to.
 pub(crate) fn numbers(function: &str, types: &[DataType], first: usize) -> Result<Vec<DataType>> {
-    if types.len() > MOST_ARGUMENTS {
+    if types.len() > MAX_ARGUMENTS {
         let count = types.len();
-        let reason = format!("{count} arguments; expected at most {MOST_ARGUMENTS}");
+        let reason = format!("{count} arguments; expected at most {MAX_ARGUMENTS}");
         return Err(unplanned(function, reason));
     }
     for (number, data_type) in types.iter().enumerate() {

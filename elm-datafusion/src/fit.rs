@@ -73,6 +73,12 @@ impl ElmFit {
     pub(crate) fn is_bound(&self) -> bool {
         self.bound.is_some()
     }
+
+    /// What it was made with.
+    pub(crate) fn bound(&self) -> Option<(Settings, Option<Sample>)> {
+        let bound = self.bound.as_ref()?;
+        Some((bound.settings.clone(), bound.sample.clone()))
+    }
 }
 
 impl Debug for ElmFit {

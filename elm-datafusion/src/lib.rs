@@ -33,6 +33,7 @@
 //!
 //! Either way the model is the same, to condition times epsilon, for any number and order of partitions.
 
+pub mod cluster;
 mod columns;
 mod error;
 mod fit;
@@ -46,7 +47,7 @@ mod table_model;
 
 use datafusion::error::Result;
 use datafusion::logical_expr::{AggregateUDF, ScalarUDF};
-use datafusion::prelude::SessionContext;
+use datafusion::prelude::{SessionConfig, SessionContext};
 
 pub use columns::Nulls;
 pub use fit::ElmFit;
@@ -69,9 +70,28 @@ pub fn register(context: &SessionContext) -> Result<()> {
         let extensions = &mut state.config_mut().options_mut().extensions;
         extensions.insert(ElmOptions::default());
     }
+    register_functions(context);
+    Ok(())
+}
+
+/// A configuration under which files alone say which rows each of `partitions` partitions has, and not which
+/// partition is idle: models have the same bits in every run.
+#[must_use]
+pub fn with_fixed_partitions(config: SessionConfig, partitions: usize) -> SessionConfig {
+    let mut config = config
+        .with_target_partitions(partitions)
+        .with_round_robin_repartition(false)
+        // Smaller files are not split.
+        .with_repartition_file_min_size(1 << 20);
+    let execution = &mut config.options_mut().execution;
+    execution.enable_file_stream_work_stealing = false;
+    config
+}
+
+/// As [`register`], without options.
+pub fn register_functions(context: &SessionContext) {
     context.register_udaf(AggregateUDF::from(ElmFit::unbound()));
     context.register_udaf(AggregateUDF::from(ElmSample::unbound()));
     context.register_udf(ScalarUDF::from(ElmPredict::one()));
     context.register_udf(ScalarUDF::from(ElmPredict::all()));
-    Ok(())
 }

@@ -183,6 +183,11 @@ impl ElmSample {
             ..Self::unbound()
         }
     }
+
+    /// What it was made with.
+    pub(crate) fn bound(&self) -> Option<(usize, bool, Nulls)> {
+        self.bound
+    }
 }
 
 impl Debug for ElmSample {

@@ -1,11 +1,12 @@
 //! What a fit is told, apart from the rows.
 
 use elm::ElmParams;
+use serde::{Deserialize, Serialize};
 
 use crate::columns::Nulls;
 
 /// The settings of `elm_fit`, the same for all rows and carried in the function, not in every row.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// Of the network.
     pub params: ElmParams<f64>,

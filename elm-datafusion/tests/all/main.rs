@@ -3,6 +3,8 @@
 // Helpers of tests are not seen as tests.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod cluster;
 mod functions;
 mod program;
 mod readme;
+mod stores;

@@ -29,7 +29,7 @@ fn bad(folder: &Path, arguments: &[&str]) -> String {
 }
 
 /// `name` with 300 rows of a, b, kind and y.
-fn rows(folder: &Path, name: &str) {
+pub(crate) fn rows(folder: &Path, name: &str) {
     let mut text = String::from("a,b,kind,sensor,y\n");
     for row in 0..300 {
         let (a, b) = ((f64::from(row) * 0.7).sin(), (f64::from(row) * 1.3).cos());
@@ -179,7 +179,6 @@ fn errors_name_the_place_and_leave_no_file() {
         ),
         ("p-1.csv", &["--neurons", "many"], "--neurons is 'many'"),
         ("p-1.csv", &["--neurons", "0"], "neurons"),
-        ("s3://bucket/p.csv", &[], "URLs are not supported"),
         ("p-1.txt", &[], "p-1.txt: no such file"),
     ] {
         let error = fit(file, rest);
@@ -210,6 +209,17 @@ fn errors_name_the_place_and_leave_no_file() {
         .collect();
     names.retain(|name| name.to_string_lossy().starts_with('.'));
     assert_eq!(names.len(), 0, "{names:?}");
+}
+
+#[test]
+fn plans_are_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    rows(folder.path(), "p.csv");
+    let plan = good(
+        folder.path(),
+        &["sql", "EXPLAIN SELECT count(y) FROM 'p.csv'"],
+    );
+    assert!(plan.contains("physical_plan"), "{plan}");
 }
 
 #[cfg(target_os = "linux")]

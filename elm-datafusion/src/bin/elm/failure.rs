@@ -36,8 +36,22 @@ impl From<DataFusionError> for Failure {
         let start = own.max().map_or(0, |at| at + "planning: ".len());
         let line = text[start..].lines().next().unwrap_or_default();
         let line = line.split(". No function matches").next().unwrap_or(line);
-        Self(line.to_owned())
+        // What other processes answer is wrapped in the types that it came through.
+        let wrapped = [
+            ("message: \"", "\", metadata"),
+            ("message: \"", "\", source"),
+            ("GrpcConnectionError(\"", ": tonic"),
+        ];
+        let inner = wrapped
+            .iter()
+            .find_map(|(start, end)| between(line, start, end));
+        Self(inner.unwrap_or(line).to_owned())
     }
+}
+
+fn between<'a>(text: &'a str, start: &str, end: &str) -> Option<&'a str> {
+    let (_, rest) = text.split_once(start)?;
+    Some(rest.rsplit_once(end)?.0)
 }
 
 impl From<datafusion::arrow::error::ArrowError> for Failure {

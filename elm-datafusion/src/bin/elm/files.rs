@@ -4,10 +4,13 @@ use std::path::Path;
 
 use datafusion::arrow::datatypes::{DataType, SchemaRef};
 use datafusion::dataframe::DataFrame;
+use datafusion::datasource::listing::ListingTableUrl;
+use datafusion::execution::object_store::ObjectStoreUrl;
 use datafusion::execution::options::ArrowReadOptions;
 use datafusion::prelude::{CsvReadOptions, JsonReadOptions, ParquetReadOptions, SessionContext};
 
 use crate::failure::Failure;
+use crate::stores;
 
 /// Kinds of files, by the end of their names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,15 +43,13 @@ fn extension(path: &str) -> &str {
     extension.unwrap_or_default()
 }
 
-/// The files that names and patterns stand for, in order.
-fn expand(patterns: &[String]) -> Result<Vec<String>, Failure> {
+/// The files that names, patterns and URLs stand for, in order.
+async fn expand(context: &SessionContext, patterns: &[String]) -> Result<Vec<String>, Failure> {
     let mut files = Vec::new();
     for pattern in patterns {
-        if pattern.contains("://") {
-            return Err(Failure::at(
-                pattern,
-                "URLs are not supported; expected files",
-            ));
+        if stores::is_url(pattern) {
+            files.extend(stores::list(context, pattern).await?);
+            continue;
         }
         if Path::new(pattern).is_file() {
             files.push(pattern.clone());
@@ -67,6 +68,12 @@ fn expand(patterns: &[String]) -> Result<Vec<String>, Failure> {
         }
     }
     Ok(files)
+}
+
+/// The store that a file is in.
+fn root(path: &str) -> Result<ObjectStoreUrl, Failure> {
+    let url = ListingTableUrl::parse(path).map_err(|reason| Failure::at(path, reason))?;
+    Ok(url.object_store())
 }
 
 async fn read(
@@ -113,7 +120,7 @@ impl Table {
         context: &SessionContext,
         patterns: &[String],
     ) -> Result<Self, Failure> {
-        let paths = expand(patterns)?;
+        let paths = expand(context, patterns).await?;
         let first = paths.first().map_or("", String::as_str);
         let kind = Kind::of(first)?;
         let mut files = Vec::new();
@@ -123,6 +130,10 @@ impl Table {
                     "expected a file that ends in .{}, as the first",
                     extension(first)
                 );
+                return Err(Failure::at(path, reason));
+            }
+            if root(path)? != root(first)? {
+                let reason = format!("expected a file from the same store as {first}");
                 return Err(Failure::at(path, reason));
             }
             let rows = read(context, kind, vec![path.clone()]).await;

@@ -10,7 +10,8 @@ use datafusion::arrow::array::{Array, AsArray, RecordBatch};
 use datafusion::arrow::datatypes::DataType;
 use datafusion::common::Column;
 use datafusion::dataframe::DataFrame;
-use datafusion::logical_expr::{AggregateUDF, Expr, cast, ident};
+use datafusion::functions_aggregate::expr_fn::count;
+use datafusion::logical_expr::{AggregateUDF, Expr, cast, ident, lit};
 use datafusion::prelude::SessionContext;
 use elm::solve::Ridge;
 use elm::{Activation, Dataset, ElmParams, persist};
@@ -19,6 +20,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use ndarray::s;
 
 use crate::Inputs;
+use crate::cluster::{self, Cluster};
 use crate::failure::Failure;
 use crate::files::{Kind, Table, is_text};
 use crate::models::{self, MODEL};
@@ -67,6 +69,8 @@ pub(crate) struct Fit {
     /// The model's file
     #[arg(short, long)]
     output: PathBuf,
+    #[command(flatten)]
+    cluster: Cluster,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -76,8 +80,13 @@ enum OnNull {
 }
 
 impl Fit {
-    pub(crate) async fn run(self, context: &SessionContext) -> Result<(), Failure> {
+    pub(crate) async fn run(self, embedded: &SessionContext) -> Result<(), Failure> {
         self.check_output()?;
+        let context = self.cluster.session(embedded).await?;
+        self.cluster.within(self.run_in(&context)).await
+    }
+
+    async fn run_in(&self, context: &SessionContext) -> Result<(), Failure> {
         let table = Table::open(context, &self.inputs.files).await?;
         let mut columns = self.columns(&table).await?;
         let arguments = self.arguments(&table, &columns)?;
@@ -247,11 +256,11 @@ impl Fit {
 
     /// What the aggregates are called with.
     fn arguments(&self, table: &Table, columns: &Columns) -> Result<Vec<Expr>, Failure> {
-        const MOST_INPUTS: usize = 9_000;
+        const MAX_INPUTS: usize = 9_000;
         let inputs: usize = columns.features.iter().map(Feature::width).sum();
-        if inputs > MOST_INPUTS {
+        if inputs > MAX_INPUTS {
             let reason =
-                format!("{inputs} inputs; expected at most {MOST_INPUTS}: name some by --features");
+                format!("{inputs} inputs; expected at most {MAX_INPUTS}: name some by --features");
             return Err(Failure::new(reason));
         }
         let mut arguments = columns.target_values();
@@ -304,15 +313,17 @@ impl Fit {
         settings: Settings,
         sample: Sample,
     ) -> Result<Vec<RecordBatch>, Failure> {
-        let bar = progress(sample.rows() + sample.skipped());
+        let expected = sample.rows() + sample.skipped();
+        let bar = progress(expected);
         let fit = ElmFit::new(settings, Some(sample));
         let watched = watch(bar.clone(), fit.progress());
         let groups: Vec<Expr> = self.group_by.iter().map(ident).collect();
         let call = AggregateUDF::from(fit).call(arguments).alias(MODEL);
-        let fitted = rows.aggregate(groups, vec![call])?.collect().await;
+        let count = count(lit(1)).alias("rows");
+        let fitted = rows.aggregate(groups, vec![call, count])?.collect().await;
         watched.abort();
         bar.finish_and_clear();
-        Ok(fitted?)
+        cluster::checked(fitted?, self.group_by.len(), expected)
     }
 }
 

@@ -5,8 +5,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use datafusion::arrow::util::pretty::pretty_format_batches;
+use datafusion::logical_expr::LogicalPlan;
 use datafusion::prelude::SessionContext;
 
+use crate::cluster::Cluster;
 use crate::failure::Failure;
 use crate::output;
 
@@ -21,10 +23,17 @@ pub(crate) struct Sql {
     /// Where the rows of the last statement go, instead of being printed
     #[arg(short, long)]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    cluster: Cluster,
 }
 
 impl Sql {
-    pub(crate) async fn run(self, context: &SessionContext) -> Result<(), Failure> {
+    pub(crate) async fn run(self, embedded: &SessionContext) -> Result<(), Failure> {
+        let context = self.cluster.session(embedded).await?;
+        self.cluster.within(self.run_in(&context)).await
+    }
+
+    async fn run_in(&self, context: &SessionContext) -> Result<(), Failure> {
         let statements = elm_datafusion::statements(&self.sql)?;
         let count = statements.len();
         for (number, statement) in statements.into_iter().enumerate() {
@@ -35,7 +44,15 @@ impl Sql {
                 }
                 _ => {
                     let all = rows.schema().fields().is_empty();
-                    let batches = rows.limit(0, Some(PRINTED + 1))?.collect().await?;
+                    let is_plan = matches!(
+                        rows.logical_plan(),
+                        LogicalPlan::Explain(_) | LogicalPlan::Analyze(_)
+                    );
+                    let rows = match is_plan {
+                        true => rows,
+                        false => rows.limit(0, Some(PRINTED + 1))?,
+                    };
+                    let batches = rows.collect().await?;
                     let found: usize = batches.iter().map(|batch| batch.num_rows()).sum();
                     if !all && !batches.is_empty() {
                         print(&pretty_format_batches(&batches)?.to_string())?;
