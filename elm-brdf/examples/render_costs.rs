@@ -27,7 +27,7 @@ fn main() -> Outcome<()> {
     savings(&library, Some((320, 180)))
 }
 
-/// A render and the median of the seconds that so many of it took.
+/// A render and the median of the seconds that `times` of it took.
 fn timed(
     times: usize,
     sheet: &Sheet,
@@ -45,7 +45,7 @@ fn timed(
     Ok((last.ok_or("nothing rendered")?, seconds[times / 2]))
 }
 
-/// A row of learnt spheres under so many lights.
+/// A row of learnt spheres under `count` lights.
 fn lights(count: usize, width: u32, height: u32) -> Outcome<Sheet> {
     let mut text = format!(
         "[image]\nwidth = {width}\nheight = {height}\nsamples = 4\n\

@@ -11,7 +11,7 @@ pub(crate) const FEW: Stream = Stream::Application(1);
 /// Anchors.
 pub(crate) const ANCHORS: Stream = Stream::Application(2);
 /// Rows that judge a network.
-pub(crate) const JUDGED: Stream = Stream::Application(3);
+pub(crate) const VALIDATION: Stream = Stream::Application(3);
 /// Rows of the search for a compact network.
 pub(crate) const COMPACT: Stream = Stream::Application(4);
 /// Directions at which a small network is fitted to a large one.

@@ -210,7 +210,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// A sum of parts that come in any order.
 struct Sums<A: Scalar> {
-    /// Of the first parts, so many.
+    /// The sum of the first `count` parts.
     all: Option<Array2<A>>,
     count: usize,
     /// Parts that wait for earlier ones.

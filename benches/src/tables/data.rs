@@ -6,7 +6,7 @@ use std::path::Path;
 use ndarray::{Array1, Array2, Axis, concatenate, s};
 
 /// Training and test rows at most.
-const MOST_ROWS: usize = 5000;
+const MAX_ROWS: usize = 5000;
 
 /// A regression table: inputs, and the target.
 #[derive(Debug, Clone)]
@@ -102,8 +102,8 @@ impl RealTable {
         let rows = self.values.nrows();
         let mut order: Vec<usize> = (0..rows).collect();
         order.sort_by_key(|&row| scrambled((number << 32) + row as u64));
-        let fitted = (rows * 3 / 4).min(MOST_ROWS);
-        let judged = rows.min(fitted + MOST_ROWS);
+        let fitted = (rows * 3 / 4).min(MAX_ROWS);
+        let judged = rows.min(fitted + MAX_ROWS);
         Split {
             train: self.values.select(Axis(0), &order[..fitted]),
             test: self.values.select(Axis(0), &order[fitted..judged]),

@@ -83,7 +83,7 @@ impl<B: Brdf> Mixed<B> {
         Self { brdf, rows }
     }
 
-    /// One channel as so many.
+    /// One channel as `channels` equal ones.
     pub(super) fn grey(brdf: B, channels: usize) -> Self {
         let rows = vec![vec![1.0]; channels];
         Self { brdf, rows }

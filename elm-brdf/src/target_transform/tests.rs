@@ -109,7 +109,7 @@ proptest! {
             let fitted = transform.fit(values.view()).unwrap();
             let back = fitted.to_values(fitted.to_targets(values.view()).unwrap()).unwrap();
             for (&value, &back) in values.iter().zip(&back) {
-                // ln(1 + f/o) stays below 25 here: so many roundings of the target.
+                // ln(1 + f/o) stays below 25 here: 25 roundings of the target.
                 prop_assert!((value - back).abs() <= 30.0 * f64::EPSILON * value, "{}", transform);
             }
         }

@@ -67,7 +67,7 @@ fn the_error_of_single_precision_is_foretold_and_not_far_too_large() {
     }
 }
 
-/// The model with so many times its error of single precision for a held-out RMSE.
+/// The model with `times` its error of single precision for a held-out RMSE.
 fn with_held_out(model: &BrdfModel, times: f64) -> BrdfModel {
     let pairs = [DirectionPair {
         incident: cartesian(0.3, 0.0),

@@ -92,7 +92,7 @@ fn bin(direction: Vector) -> usize {
     row.min(THETAS - 1) * PHIS + column.min(PHIS - 1)
 }
 
-/// Pearson's statistic of draws over what is expected of so many in each bin, and what a right sampler passes
+/// Pearson's statistic of draws over their expected number in each bin, and what a right sampler passes
 /// once in three million times (Wilson and Hilferty).
 fn chi_square(counts: &[f64], shares: &[f64]) -> (f64, f64) {
     let draws: f64 = counts.iter().sum();

@@ -10,15 +10,15 @@ use crate::brdf::{Brdf, EvalError};
 use crate::geometry::{DirectionPair, Vector, cartesian, dot, polar, reflect};
 
 /// The least density of normals, as a part of that of a surface without preference.
-const LEAST_DENSITY: f64 = 1e-3;
+const MIN_DENSITY: f64 = 1e-3;
 /// What the density of visible normals has beside its own, so that nothing is divided by zero: over all solid
 /// angles alike, and next to the normal, where these have no area.
-const LEAST_VISIBLE: f64 = 1e-3;
-const LEAST_AT_NORMAL: f64 = 1e-6;
+const MIN_VISIBLE: f64 = 1e-3;
+const MIN_AT_NORMAL: f64 = 1e-6;
 /// How many times as many points as visible normals call for may lie anywhere. Next to the normal of the
 /// surface, where a square of the table is no area, densities that fall less fast than the area would be a
 /// peak to draw.
-const MOST_POINTS: f64 = 100.0;
+const MAX_POINTS: f64 = 100.0;
 /// Steps of the power iteration; the authors' converges in four.
 const STEPS: usize = 8;
 
@@ -122,8 +122,8 @@ impl Facets {
         let density = |((point, &normal), change): (([f64; 2], &Vector), f64)| {
             let facing = dot(incident, normal).max(0.0) * stretch(point);
             let seen = self.ndf.at(0, point) * facing / area;
-            let changing = (scale * change).min(MOST_POINTS * seen);
-            let least = LEAST_VISIBLE * stretch(point) / TAU + LEAST_AT_NORMAL;
+            let changing = (scale * change).min(MAX_POINTS * seen);
+            let least = MIN_VISIBLE * stretch(point) / TAU + MIN_AT_NORMAL;
             (0.5 * seen + 0.5 * changing + least) as f32
         };
         Ok(all.map(density).collect())
@@ -239,7 +239,7 @@ fn normalise(density: &mut [f64], normals: &[Vector], areas: &[f64]) {
     let total = area(density);
     let scale = if total > 0.0 { 1.0 / total } else { 0.0 };
     for value in density.iter_mut() {
-        *value = (*value * scale).max(LEAST_DENSITY / PI);
+        *value = (*value * scale).max(MIN_DENSITY / PI);
     }
     let total = area(density);
     for value in density.iter_mut() {

@@ -9,7 +9,7 @@ use crate::geometry::{DirectionPair, Vector, dot, reflect};
 /// The part of what is drawn that is drawn as a white surface reflects, which leaves no direction out.
 const DRAWN_AS_WHITE: f64 = 1e-3;
 /// The least luminance over its mean, so that nothing is divided by zero.
-const LEAST_LUMINANCE: f64 = 1e-6;
+const MIN_LUMINANCE: f64 = 1e-6;
 
 /// The points of a slice of the tables of values.
 pub(super) struct Points {
@@ -68,7 +68,7 @@ impl Points {
         } else {
             1.0
         };
-        let least = LEAST_LUMINANCE * mean(&|f, angle| (f + white) * angle);
+        let least = MIN_LUMINANCE * mean(&|f, angle| (f + white) * angle);
         let all = means.iter().zip(&self.angles);
         all.map(|(f, angle)| ((f + white) * angle).max(least) as f32)
             .collect()

@@ -16,7 +16,7 @@ const ROWS: usize = 20_000;
 const TILE: usize = 512;
 /// The least ridge, relative to the largest squared singular value, that leverages are computed with: the
 /// normal equations have no digits below.
-const LEAST_RIDGE: f64 = 1e-12;
+const MIN_RIDGE: f64 = 1e-12;
 
 /// Rows of a fit, and their scores without them.
 pub(super) struct LeftOut {
@@ -140,7 +140,7 @@ impl Moments {
     fn factor(&self, lambda: f64) -> Result<Cholesky<f64>> {
         let largest = largest_eigenvalue(&Symmetric::of_lower(&self.products)).unwrap_or(1.0);
         let mut products = self.products.clone();
-        let ridge = largest * lambda.max(LEAST_RIDGE);
+        let ridge = largest * lambda.max(MIN_RIDGE);
         products.diag_mut().mapv_inplace(|d| d + ridge);
         Cholesky::new(products)
     }

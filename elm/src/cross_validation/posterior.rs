@@ -42,7 +42,7 @@ impl<A: Scalar> Posterior<A> {
         }
     }
 
-    /// Whether it is of a layer of so many columns.
+    /// Whether it is of a layer of `columns` columns.
     #[cfg(feature = "serde")]
     pub(crate) fn check(&self, columns: usize) -> Result<()> {
         check_length("columns of a posterior", self.mean.len(), columns)?;

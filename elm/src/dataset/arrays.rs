@@ -226,7 +226,7 @@ impl sealed::Matrix for Ix2 {
     }
 }
 
-/// Whether a network of so many outputs can predict arrays of this dimension.
+/// Whether a network of `outputs` outputs can predict arrays of this dimension.
 pub(crate) fn check_outputs<D: TargetDim>(outputs: usize) -> Result<()> {
     if D::SINGLE && outputs != 1 {
         return Err(Error::Shape {

@@ -18,7 +18,7 @@ pub(crate) struct RepeatedRows<A: Scalar, D: TargetDim> {
 }
 
 impl<A: Scalar, D: TargetDim> RepeatedRows<A, D> {
-    /// Nothing unless weights are [counts] of which some are above 1, and of at most so many rows in all.
+    /// Nothing unless weights are [counts] of which some are above 1, and of at most `most` rows in all.
     pub(crate) fn new(data: &Dataset<'_, A, D>, most: usize) -> Option<Self> {
         let weights = data.weights()?;
         let counts = counts(weights.iter().map(|weight| weight.as_f64()))?;

@@ -96,7 +96,7 @@ fn product<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>, b: ArrayView2<'_, A
     out
 }
 
-/// Into how many parts so many multiplications are cut.
+/// The number of parts into which `work` multiplications are cut.
 fn parts(work: usize) -> usize {
     const MOST: usize = 16;
     (work / (4 * threads::WORTHWHILE)).clamp(1, MOST)

@@ -29,7 +29,7 @@ pub(crate) struct DesignSvd<A: Scalar> {
     /// For each output the sum of squares of $\tilde T$ that no singular vector reaches.
     pub(crate) residual_ss: Array1<A>,
     /// The sum of squares of each column as predictions see it: scaled but not centered.
-    pub(crate) lengths: Array1<A>,
+    pub(crate) column_ss: Array1<A>,
     /// The weakest relative strength of ridge that this serves; nothing where it serves all. Sums of products
     /// of a bad condition have no digits of directions that weaker ones do not hold back.
     pub(crate) weakest: Option<f64>,
@@ -101,7 +101,7 @@ impl<A: Scalar> DesignSvd<A> {
         mut residual_ss: Array1<A>,
         frame: Equilibration<A>,
     ) -> Result<Self> {
-        let lengths = frame.lengths(hidden);
+        let column_ss = frame.column_ss(hidden);
         let Svd { u, s, vt } = truncate(A::svd(hidden)?, frame.weighted_rows);
         let c = A::product(u.t(), targets.view());
         if frame.spanned_by(s.len()) {
@@ -116,7 +116,7 @@ impl<A: Scalar> DesignSvd<A> {
             vt,
             c,
             residual_ss,
-            lengths,
+            column_ss,
             weakest: None,
             frame,
         })
@@ -228,7 +228,10 @@ impl<A: Scalar> DesignSvd<A> {
         let gain = (kept / &self.s).insert_axis(Axis(1));
         let along = &self.c * &gain;
         let squared = roundoff * roundoff;
-        let longest = self.lengths.iter().fold(0.0, |m: f64, l| m.max(l.as_f64()));
+        let longest = self
+            .column_ss
+            .iter()
+            .fold(0.0, |m: f64, l| m.max(l.as_f64()));
         let matters: Vec<usize> = (0..along.ncols())
             .filter(|&output| {
                 let column = along.column(output);
@@ -239,7 +242,7 @@ impl<A: Scalar> DesignSvd<A> {
         let beta = A::product(self.vt.t(), along.select(Axis(1), &matters).view());
         for (&output, beta) in matters.iter().zip(beta.columns()) {
             let sum = Zip::from(beta)
-                .and(&self.lengths)
+                .and(&self.column_ss)
                 .fold(A::zero(), |sum, &b, &length| sum + b * b * length);
             errors[output] = squared * sum.as_f64();
         }
@@ -319,7 +322,7 @@ impl<A: Scalar> DesignSvdWithRows<A> {
         absent: Array1<A>,
         frame: Equilibration<A>,
     ) -> Result<Self> {
-        let lengths = frame.lengths(hidden.view());
+        let column_ss = frame.column_ss(hidden.view());
         let Svd { u, s, vt } = truncate(A::svd(hidden.view())?, frame.weighted_rows);
         let c = A::product(u.t(), targets.view());
         let spanned = frame.spanned_by(u.ncols());
@@ -332,7 +335,7 @@ impl<A: Scalar> DesignSvdWithRows<A> {
                 vt,
                 residual_ss: Array1::zeros(targets.ncols()),
                 c,
-                lengths,
+                column_ss,
                 weakest: None,
                 frame,
             },

@@ -98,7 +98,7 @@ impl<A: Scalar> Equilibration<A> {
     }
 
     /// The sum of squares of each column of the scaled matrix before it was centered.
-    pub(crate) fn lengths(&self, centered: ArrayView2<'_, A>) -> Array1<A> {
+    pub(crate) fn column_ss(&self, centered: ArrayView2<'_, A>) -> Array1<A> {
         let spread = centered.map_axis(Axis(0), |column| column.dot(&column));
         let mean = self.hidden_mean.mapv(|m| m / self.hidden_scale);
         spread + mean.mapv_into(|m| m * m * self.total_weight)

@@ -136,7 +136,7 @@ impl<A: Scalar> RowSource<'_, A> {
     /// Parts of the rows whose sums are taken by themselves, on whatever thread, and then added in their
     /// order.
     pub(super) fn parts(&self) -> Vec<Range<usize>> {
-        /// Parts of so many rows cost far more than adding their sums does.
+        /// Parts of this size cost far more than adding their sums does.
         const ROWS: usize = 1024;
         const MOST: usize = 16;
         /// Numbers in the sums of all parts.

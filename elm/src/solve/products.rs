@@ -139,14 +139,14 @@ impl<A: Scalar> Tiles<'_, '_, A> {
         let weakest = (!conditioned).then(|| gram::weakest_searched(share) * larger);
         let frame = moments.frame;
         let mean = &frame.hidden_mean / frame.hidden_scale;
-        let lengths = &gram.diag() + &mean.mapv_into(|m| m * m * frame.total_weight);
+        let column_ss = &gram.diag() + &mean.mapv_into(|m| m * m * frame.total_weight);
         Ok(Some(DesignSvd {
             route: Route::GramSvd,
             s,
             vt,
             c,
             residual_ss,
-            lengths,
+            column_ss,
             weakest,
             frame,
         }))

@@ -41,7 +41,7 @@ impl Threshold {
         entries: 1 << 17,
     };
 
-    /// Whether a problem has so many rows and columns.
+    /// Whether a problem of this size meets it.
     pub(super) fn is_met(self, rows: usize, columns: usize) -> bool {
         rows.saturating_mul(columns) >= self.entries && self.has_rows(rows, columns)
     }
@@ -53,8 +53,8 @@ impl Threshold {
 
 /// Rows of a sample, in units of the columns: enough to see what the condition is about. At most a quarter
 /// of the rows; of fewer than that takes none is taken.
-const SAMPLE: usize = 4;
-const LEAST_SAMPLE: usize = 2;
+const SAMPLE_PER_COLUMN: usize = 4;
+const MIN_SAMPLE_PER_COLUMN: usize = 2;
 /// Rows below which a sample's means are not yet near those of all rows.
 pub(super) const MIN_SAMPLE: usize = 256;
 /// Rows that enter the triangle together, in units of the columns: what is factorized again with
@@ -213,7 +213,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
         Ok(wide.slice(s![..rows.len(), ..]))
     }
 
-    /// At least so many rows from everywhere, less their center, which the shift is set to.
+    /// At least `wanted` rows from everywhere, less their center, which the shift is set to.
     ///
     /// # Errors
     /// Those of making the rows.
@@ -244,7 +244,7 @@ impl<'s, 'a, A: Scalar> Tiles<'s, 'a, A> {
     /// Rows of a sample that tells what the condition is about.
     pub(super) fn sample_rows(&self) -> usize {
         let width = self.source.width();
-        (self.rows() / 4).clamp(LEAST_SAMPLE * width, SAMPLE * width)
+        (self.rows() / 4).clamp(MIN_SAMPLE_PER_COLUMN * width, SAMPLE_PER_COLUMN * width)
     }
 
     /// The problem in the coordinates of its singular vectors, from the triangle; or nothing where the

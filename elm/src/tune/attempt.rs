@@ -24,7 +24,7 @@ impl Attempt {
     }
 }
 
-/// Whether the mean of `new` is smaller by more than so many standard errors of the difference, row by row.
+/// Whether the mean of `new` is smaller by more than `standard_errors` of the paired difference.
 pub(super) fn surely_smaller(new: &[f64], old: &[f64], standard_errors: f64) -> bool {
     let gains = || old.iter().zip(new).map(|(old, new)| old - new);
     let rows = new.len() as f64;

@@ -28,7 +28,7 @@ const COLUMNS: usize = 600;
 pub(super) const FEW_ROWS: usize = 1500;
 const FOLDS: usize = 3;
 /// Layers that are solved at most; a path has some 20.
-const MOST_LAYERS: usize = 500;
+const MAX_LAYERS: usize = 500;
 /// What any other candidate must win by over ramps and one round of slopes, which do well on most tables.
 const MARGIN: f64 = 0.005;
 /// A held-out error, relative to the targets' deviation, that sums of squares cannot tell from 0.
@@ -95,7 +95,7 @@ pub(super) fn search<A: Scalar, D: TargetDim>(
         embedded: Seen::new(x.clone(), targets, weights, Some(bins(&x)), seed)
             .with_bounded(tuner.base.bounded()),
         neurons,
-        left: MOST_LAYERS,
+        left: MAX_LAYERS,
         rounds: if tuner.per_input { ROUNDS } else { 0 },
         trials: Vec::new(),
         last: [None, None],

@@ -236,7 +236,7 @@ impl<A: Scalar, D: TargetDim> CompactUncertainElm<A, D> {
 /// How many times what an output may change by outside of the data either end of an interval is moved.
 pub(super) const EDGES: f64 = 6.0;
 
-/// How many of so many rows lie outside of an interval's end: $\lfloor \alpha (n + 1) \rfloor$.
+/// How many of n rows lie outside of an interval's end: $\lfloor \alpha (n + 1) \rfloor$.
 pub(super) fn rows_outside(coverage: f64, rows: usize) -> Result<usize> {
     if !(coverage > 0.0 && coverage < 1.0) {
         return Err(Error::Parameter {

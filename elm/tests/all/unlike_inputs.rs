@@ -217,7 +217,7 @@ fn outliers_and_long_tails_are_no_other_distribution() {
         .unwrap();
 }
 
-/// Rows of one number and a category of so many levels, as columns of 0 and 1, each level with an
+/// Rows of one number and a category of `levels` levels, as columns of 0 and 1, each level with an
 /// effect of its own; and noise.
 fn categories(rows: usize, levels: usize, seed: u64) -> (Array2<f64>, Array1<f64>, Array1<f64>) {
     let effects = normal::<f64>(levels, 1, 77);

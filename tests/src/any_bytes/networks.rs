@@ -79,7 +79,7 @@ fn mended(bytes: &[u8]) -> Option<Vec<u8>> {
     Some(mended)
 }
 
-/// Some rows that a network of so many inputs might be given.
+/// Some rows that a network of `inputs` inputs might be given.
 fn rows<A: Scalar>(inputs: usize) -> Array2<A> {
     Array2::from_shape_fn((3, inputs), |(row, input)| {
         A::from_f64(row as f64 - 0.3 * input as f64)

@@ -30,7 +30,7 @@ const NEAREST: usize = 6;
 /// Measurements listed for each anchor, so that some are left when a fold is left out.
 const LISTED: usize = 24;
 /// Measurements left out to see what guesses are worth.
-const JUDGED: usize = 200;
+const VALIDATION: usize = 200;
 
 /// Coordinates in which near means alike; the last two turn with a surface that has a `grain`.
 fn place(pair: &DirectionPair, anisotropic: bool) -> [f64; 5] {
@@ -150,7 +150,7 @@ pub(super) struct Anchors {
     pub(super) pairs: Vec<DirectionPair>,
     near: Vec<Vec<Near>>,
     /// Squared distance between each of some measurements and its nearest others, with these.
-    judged: Vec<(usize, Vec<Near>)>,
+    validation: Vec<(usize, Vec<Near>)>,
 }
 
 impl Anchors {
@@ -162,14 +162,14 @@ impl Anchors {
             .map(|pair| place(pair, neighborhood.anisotropic));
         let near = near.map(|at| neighborhood.nearest(at, LISTED, None));
         let rows = neighborhood.places.len();
-        let judged = index::sample(&mut random, rows, JUDGED.min(rows));
-        let judged = judged.into_iter().map(|row| {
+        let validation = index::sample(&mut random, rows, VALIDATION.min(rows));
+        let validation = validation.into_iter().map(|row| {
             let at = neighborhood.places[row];
             (row, neighborhood.nearest(at, NEAREST, Some(row)))
         });
         Self {
             near: near.collect(),
-            judged: judged.collect(),
+            validation: validation.collect(),
             pairs,
         }
     }
@@ -195,7 +195,7 @@ impl Anchors {
     /// variance `variances` about the network.
     pub(super) fn weights(&self, targets: ArrayView2<'_, f64>, variances: &[f64]) -> Array1<f64> {
         let (mut squares, mut distances) = (0.0, 0.0);
-        for (row, near) in &self.judged {
+        for (row, near) in &self.validation {
             let mut guess = Array1::zeros(targets.ncols());
             mean_of(near, targets, guess.view_mut());
             let errors = (&guess - &targets.row(*row)).into_iter();
@@ -203,7 +203,7 @@ impl Anchors {
             squares += relative.sum::<f64>() / variances.len() as f64;
             distances += near.first().map_or(0.0, |nearest| nearest.0);
         }
-        let count = self.judged.len().max(1) as f64;
+        let count = self.validation.len().max(1) as f64;
         let (squares, usual) = ((squares / count).max(1.0), distances / count);
         let weight = |near: &Vec<Near>| {
             let distance = near.first().map_or(0.0, |nearest| nearest.0);

@@ -13,7 +13,7 @@ use ndarray::{Array2, ArrayView2};
 /// Rounds of working residuals without, and with values cut off.
 const ROUNDS: usize = 3;
 const MORE_ROUNDS: usize = 10;
-/// Noise is learnt from rows whose value is below so many of its deviations.
+/// Noise is learnt from rows whose value is below this multiple of its standard deviation.
 const DARK: f64 = 4.0;
 
 /// The noise of each channel whose zeros are negative values cut off.

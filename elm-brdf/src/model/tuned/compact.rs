@@ -18,7 +18,7 @@ use crate::streams::{self, generator};
 use crate::target_transform::{FittedTransform, TargetTransform};
 use elm_datasets::geometry::DirectionPair;
 
-/// A network of so many neurons of one function, made for cheap [evaluation](crate::batch).
+/// A network of `neurons` neurons of one function, made for cheap [evaluation](crate::batch).
 ///
 /// # Parameters
 ///
@@ -108,7 +108,7 @@ impl Compact {
         let rows = index::sample(&mut random, pairs.len(), wanted).into_vec();
         // Of few rows most are needed for the fit. A single one is fitted and judges.
         let judges = if wanted == 2 * ROWS { ROWS } else { wanted / 4 };
-        let (fitted, judged) = rows.split_at(wanted - judges);
+        let (fitted, validation) = rows.split_at(wanted - judges);
         let search = Search {
             lean: self,
             scaler: &scaler,
@@ -123,11 +123,15 @@ impl Compact {
                 &transform,
             ),
         };
-        let judged = if judged.is_empty() { fitted } else { judged };
+        let validation = if validation.is_empty() {
+            fitted
+        } else {
+            validation
+        };
         let judge = Judge {
-            pairs: select(pairs, judged),
-            x: x.select(Axis(0), judged),
-            values: values.select(Axis(0), judged),
+            pairs: select(pairs, validation),
+            x: x.select(Axis(0), validation),
+            values: values.select(Axis(0), validation),
         };
         let mut best: Option<Found> = None;
         for (scale, bias) in SCALES.into_iter().flat_map(|s| BIASES.map(|b| (s, b))) {

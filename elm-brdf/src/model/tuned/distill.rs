@@ -56,8 +56,8 @@ struct Places {
 impl Places {
     fn new(problem: &Problem<'_>, features: Features, teacher: &impl Teacher) -> Result<Self> {
         let mut random = generator(problem.tuned.seed, streams::DISTILL);
-        let judged = problem.judged_pairs.iter().copied();
-        let mut pairs: Vec<DirectionPair> = judged.take(MEASURED).collect();
+        let validation = problem.validation_pairs.iter().copied();
+        let mut pairs: Vec<DirectionPair> = validation.take(MEASURED).collect();
         let measured = pairs.len();
         pairs.extend(scatter(&mut random, problem.anisotropic));
         let (targets, without) = teacher.targets(&pairs);
@@ -111,7 +111,7 @@ impl Problem<'_> {
     /// The layer with output weights of which the albedo is physical, if there are any.
     fn like(&self, features: Features, map: &FeatureMap<f64>, places: &Places) -> Result<Fitted> {
         let h = map.transform(&places.x)?;
-        let judged = map.transform(&features.compute(&self.judged_pairs))?;
+        let validation = map.transform(&features.compute(&self.validation_pairs))?;
         let mut albedo = AlbedoCheck::new(self.anisotropic);
         let mut best: Option<Fitted> = None;
         let mut between = BETWEEN;
@@ -125,12 +125,12 @@ impl Problem<'_> {
             })?;
             if best.as_ref().is_none_or(|best| excess < best.excess) {
                 let factor = equations.factor(strength).ok_or_else(no_fit)?;
-                let mut held_out = Array2::zeros((self.judged.len(), self.targets.ncols()));
+                let mut held_out = Array2::zeros((self.validation.len(), self.targets.ncols()));
                 let mut first = 0;
                 for (fold, targets) in self.folds.iter().zip(&places.without) {
                     let solved = factor.solve(&equations.again(&h, targets, Some(&weights)))?;
                     let range = Slice::from(first..first + fold.len());
-                    let fitted = solved.apply(judged.slice_axis(Axis(0), range));
+                    let fitted = solved.apply(validation.slice_axis(Axis(0), range));
                     held_out.slice_axis_mut(Axis(0), range).assign(&fitted);
                     first += fold.len();
                 }

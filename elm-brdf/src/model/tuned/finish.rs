@@ -24,10 +24,10 @@ use crate::features::Features;
 use crate::metrics::{Metric, Metrics};
 use crate::model::{Draw, Layer};
 
-/// The squared error that rounding makes counts so many times: what is exported is to be better
-/// than what rounding alone leaves.
+/// The weight of the squared rounding error: what is exported is to be better than what rounding
+/// alone leaves.
 pub(super) const ROUNDING: f64 = 25.0;
-/// While the albedo is not physical they count ten times as much, so many times.
+/// While the albedo is not physical their weight grows tenfold, at most this number of times.
 const STEPS: usize = 6;
 /// Rounds of working residuals end where targets move by a two-thousandth of their size.
 const CONVERGED: f64 = 2.5e-7;
@@ -58,7 +58,7 @@ pub(super) struct Fitted {
 
 /// The fits without a fold each.
 struct LeftOut {
-    /// Of the targets of all judged rows, each by the fit without its fold.
+    /// Of the targets of all validation rows, each by the fit without its fold.
     predicted: Array2<f64>,
     /// Of one of these fits.
     weights: Weights,
@@ -130,8 +130,8 @@ impl Problem<'_> {
             return Ok(None);
         }
         let predicted = self.transform.to_values(held_out.clone())?;
-        let values = self.values.select(Axis(0), &self.judged);
-        Metrics::of(&self.judged_pairs, predicted.view(), values.view()).map(Some)
+        let values = self.values.select(Axis(0), &self.validation);
+        Metrics::of(&self.validation_pairs, predicted.view(), values.view()).map(Some)
     }
 
     /// Errors of targets where RMSE is asked for: all rows count alike, where a few bright ones
@@ -140,7 +140,7 @@ impl Problem<'_> {
         let metric = self.tuned.metric;
         if metric == Metric::Rmse {
             let transform = self.transform.plain();
-            let values = self.values.select(Axis(0), &self.judged);
+            let values = self.values.select(Axis(0), &self.validation);
             let targets = transform.to_targets(values.view())?;
             let errors = self.transform.in_channels(held_out.view()) - targets;
             return Ok(geometric_root(&self.mean_squares(errors)));
@@ -151,13 +151,13 @@ impl Problem<'_> {
 
     /// The mean squared error of each output, the largest cut off.
     fn variances(&self, held_out: &Array2<f64>) -> Vec<f64> {
-        self.mean_squares(held_out - &self.targets(&self.judged))
+        self.mean_squares(held_out - &self.targets(&self.validation))
     }
 
-    /// The mean squares of errors at the judged rows, the largest cut off.
+    /// The mean squares of errors at the validation rows, the largest cut off.
     fn mean_squares(&self, errors: Array2<f64>) -> Vec<f64> {
         let mut squares = errors.mapv_into(|error| error * error);
-        if let Some(weights) = self.weights(&self.judged) {
+        if let Some(weights) = self.weights(&self.validation) {
             squares *= &weights.insert_axis(Axis(1));
         }
         cut_off_means(squares.view())
@@ -171,7 +171,7 @@ impl Problem<'_> {
         pull: Option<&Pull>,
     ) -> Result<Vec<Option<LeftOut>>> {
         let outputs = self.targets.ncols();
-        let mut predicted = vec![Array2::zeros((self.judged.len(), outputs)); strengths.len()];
+        let mut predicted = vec![Array2::zeros((self.validation.len(), outputs)); strengths.len()];
         let mut whole: Vec<Option<Weights>> = vec![None; strengths.len()];
         let mut failed: Vec<bool> = vec![false; strengths.len()];
         let mut first = 0;
@@ -194,7 +194,7 @@ impl Problem<'_> {
             first += fold.len();
             // One product for all strengths.
             let fitted = Weights::joined(whole.iter().flatten());
-            let fitted = fitted.apply(rows.judged.slice_axis(Axis(0), range));
+            let fitted = fitted.apply(rows.validation.slice_axis(Axis(0), range));
             let parts = fitted.axis_chunks_iter(Axis(1), outputs);
             let there = predicted
                 .iter_mut()
@@ -273,7 +273,7 @@ impl Problem<'_> {
         best: usize,
         spread: &[f64],
     ) -> usize {
-        let targets = self.targets(&self.judged);
+        let targets = self.targets(&self.validation);
         let squares = |held_out: &Array2<f64>| -> Array1<f64> {
             let errors = (held_out - &targets).mapv_into(|error| error * error);
             errors.dot(&Array1::from_iter(spread.iter().map(|spread| 1.0 / spread)))
@@ -345,9 +345,9 @@ impl Problem<'_> {
                 &pull.all.again(&pull.h, &guesses, Some(&pull.weights)),
                 pull.times,
             );
-            let before = weights.apply(rows.judged.view());
+            let before = weights.apply(rows.validation.view());
             weights = factor.solve(&moved)?;
-            let after = weights.apply(rows.judged.view());
+            let after = weights.apply(rows.validation.view());
             // What the noise moves, not what the rows say.
             let moved = (&after - &before).mapv_into(|d| d * d).sum();
             if moved <= CONVERGED * before.mapv(|t| t * t).sum() {

@@ -45,8 +45,8 @@ const ANISOTROPY_GAIN: f64 = 1.25;
 /// Where every scale begins.
 const FIRST_SCALE: f64 = 0.7;
 
-/// Neurons drawn for so many to be kept: four to one of few, three to two of many, as elimination
-/// costs the cube.
+/// Candidates drawn to keep `neurons`: 4 n for small networks, 1.5 n for large, as elimination costs
+/// the cube.
 fn drawn(neurons: usize) -> usize {
     (4 * neurons).min((neurons + neurons / 2).max(320))
 }
@@ -135,8 +135,8 @@ pub(super) fn with_outputs(
     let search = Search::new(tuned, &plain, pairs, values, rows)?;
     let inputs = search.inputs(setting.set)?;
     let judge = Judge {
-        pairs: &search.judged.pairs,
-        values: search.judged.values.view(),
+        pairs: &search.validation.pairs,
+        values: search.validation.values.view(),
     };
     let mut known: Option<(usize, Array2<f64>)> = None;
     tuned.with_outputs(
@@ -162,7 +162,7 @@ pub(super) fn with_outputs(
             let params = params.with_solver(Ridge::relative(RIDGE));
             let targets = transform.to_targets(search.fitted.values.view())?;
             let network = params.fit_map(map, &dataset(&inputs.fitted, &targets, None)?)?;
-            let predicted = network.predict(&inputs.judged)?;
+            let predicted = network.predict(&inputs.validation)?;
             known = Some((neurons, predicted.clone()));
             Ok(Some(predicted))
         },
@@ -219,14 +219,14 @@ struct Search<'a> {
     tuned: &'a Tuned,
     transform: &'a FittedTransform,
     fitted: Part,
-    judged: Part,
+    validation: Part,
 }
 
 /// One set of inputs at the rows of both parts.
 struct Inputs {
     set: Features,
     fitted: Array2<f64>,
-    judged: Array2<f64>,
+    validation: Array2<f64>,
     scaler: Scaler<f64>,
 }
 
@@ -240,12 +240,12 @@ impl<'a> Search<'a> {
         rows: &[usize],
     ) -> Result<Self> {
         let targets = transform.to_targets(values)?;
-        let (fitted, judged) = rows.split_at(rows.len() / 2);
+        let (fitted, validation) = rows.split_at(rows.len() / 2);
         Ok(Self {
             tuned,
             transform,
             fitted: part(pairs, values, &targets, fitted),
-            judged: part(pairs, values, &targets, judged),
+            validation: part(pairs, values, &targets, validation),
         })
     }
 
@@ -255,7 +255,7 @@ impl<'a> Search<'a> {
             set,
             scaler: Scaler::measured(&fitted)?,
             fitted,
-            judged: set.compute(&self.judged.pairs),
+            validation: set.compute(&self.validation.pairs),
         })
     }
 
@@ -314,14 +314,14 @@ impl<'a> Search<'a> {
         let params = params.with_solver(Ridge::relative(RIDGE));
         let data = dataset(&inputs.fitted, &self.fitted.targets, None)?;
         let network = params.fit_map(map, &data)?;
-        let targets = network.predict(&inputs.judged)?;
+        let targets = network.predict(&inputs.validation)?;
         let predicted = self.transform.to_values(targets.clone())?;
         Ok(Setting {
             set: inputs.set,
             scales,
             error: self.error(&targets, &predicted)?,
             predicted,
-            measured: self.judged.values.clone(),
+            measured: self.validation.values.clone(),
         })
     }
 
@@ -330,11 +330,11 @@ impl<'a> Search<'a> {
     fn error(&self, targets: &Array2<f64>, predicted: &Array2<f64>) -> Result<f64> {
         let metric = self.tuned.metric;
         if metric != Metric::Rmse {
-            let truth = self.judged.values.view();
-            let metrics = Metrics::of(&self.judged.pairs, predicted.view(), truth)?;
+            let truth = self.validation.values.view();
+            let metrics = Metrics::of(&self.validation.pairs, predicted.view(), truth)?;
             return Ok(metric.of(&metrics));
         }
-        let variances = cut_off_means((targets - &self.judged.targets).mapv(|e| e * e).view());
+        let variances = cut_off_means((targets - &self.validation.targets).mapv(|e| e * e).view());
         Ok(geometric_root(&variances))
     }
 }

@@ -135,12 +135,12 @@ impl NormalEquations {
         }
     }
 
-    /// Adds what is of the targets so many times.
+    /// Adds `times` the products with the targets of `other`.
     pub(super) fn add_cross(&mut self, other: &Self, times: f64) {
         self.cross.scaled_add(times, &other.cross);
     }
 
-    /// Adds `other` so many times; -1 takes it away.
+    /// Adds `times * other`; -1 subtracts it.
     pub(super) fn add(&mut self, other: &Self, times: f64) {
         self.gram.scaled_add(times, &other.gram);
         self.cross.scaled_add(times, &other.cross);

@@ -41,9 +41,8 @@ impl Judge<'_> {
 
 impl Tuned {
     /// `transform` with a basis of the outputs that are good enough, or as it is for few channels. Its basis
-    /// is found from `values`; `predict` gives, for a basis of the most outputs, so many of them predicted at
-    /// the rows of
-    /// `judge`, `None` where the limits leave no room for so many.
+    /// is found from `values`. `predict(basis, n)` predicts the first n outputs of a basis at the rows of
+    /// `judge`; `None` where the limits leave no room for n.
     pub(super) fn with_outputs(
         &self,
         transform: FittedTransform,

@@ -14,7 +14,7 @@ use elm_datasets::geometry::DirectionPair;
 /// Folds of the cross-validation.
 const FOLDS: usize = 5;
 /// Rows that are left out in turn, at most.
-const JUDGED: usize = 6_000;
+const VALIDATION: usize = 6_000;
 /// Measurements that guesses are made from, at most.
 const KNOWN: usize = 4_000;
 
@@ -35,9 +35,9 @@ pub(super) struct Problem<'a> {
     /// The rows that are left out in turn, fold by fold.
     pub(super) folds: Vec<Vec<usize>>,
     /// All rows of the folds, in their order.
-    pub(super) judged: Vec<usize>,
-    pub(super) judged_pairs: Vec<DirectionPair>,
-    /// The measurements that guesses are made from, as places among the judged.
+    pub(super) validation: Vec<usize>,
+    pub(super) validation_pairs: Vec<DirectionPair>,
+    /// The measurements that guesses are made from, as places among the validation rows.
     pub(super) known: Vec<usize>,
     pub(super) neighborhood: Neighborhood,
     pub(super) anchors: Anchors,
@@ -53,20 +53,28 @@ impl<'a> Problem<'a> {
         noisy: bool,
         anisotropic: bool,
     ) -> Result<Self> {
-        let mut random = generator(tuned.seed, streams::JUDGED);
+        let mut random = generator(tuned.seed, streams::VALIDATION);
         let rows = pairs.len();
-        let judged = index::sample(&mut random, rows, rows.min(JUDGED)).into_vec();
+        let validation = index::sample(&mut random, rows, rows.min(VALIDATION)).into_vec();
         let count = FOLDS.min(rows);
         let folds: Vec<Vec<usize>> = (0..count)
-            .map(|fold| judged.iter().copied().skip(fold).step_by(count).collect())
+            .map(|fold| {
+                validation
+                    .iter()
+                    .copied()
+                    .skip(fold)
+                    .step_by(count)
+                    .collect()
+            })
             .collect();
-        let judged: Vec<usize> = folds.concat();
-        let judged_pairs: Vec<DirectionPair> = judged.iter().map(|&row| pairs[row]).collect();
-        let known: Vec<usize> = (0..judged.len())
-            .step_by(judged.len().div_ceil(KNOWN).max(1))
+        let validation: Vec<usize> = folds.concat();
+        let validation_pairs: Vec<DirectionPair> =
+            validation.iter().map(|&row| pairs[row]).collect();
+        let known: Vec<usize> = (0..validation.len())
+            .step_by(validation.len().div_ceil(KNOWN).max(1))
             .collect();
         let known_pairs: Vec<DirectionPair> =
-            known.iter().map(|&place| judged_pairs[place]).collect();
+            known.iter().map(|&place| validation_pairs[place]).collect();
         let neighborhood = Neighborhood::new(&known_pairs, anisotropic);
         Ok(Self {
             targets: transform.to_targets(values)?,
@@ -80,8 +88,8 @@ impl<'a> Problem<'a> {
             noisy,
             anisotropic,
             folds,
-            judged,
-            judged_pairs,
+            validation,
+            validation_pairs,
             known,
             neighborhood,
         })
@@ -104,13 +112,16 @@ impl<'a> Problem<'a> {
     }
 
     /// All rows of the folds, in their order.
-    pub(super) fn judged(&self) -> &[usize] {
-        &self.judged
+    pub(super) fn validation(&self) -> &[usize] {
+        &self.validation
     }
 
     /// The rows that guesses are made from.
     fn known_rows(&self) -> Vec<usize> {
-        self.known.iter().map(|&place| self.judged[place]).collect()
+        self.known
+            .iter()
+            .map(|&place| self.validation[place])
+            .collect()
     }
 
     /// What the nearest measurements say of the targets at any pairs.
@@ -125,14 +136,14 @@ impl<'a> Problem<'a> {
         self.anchors.weights(targets.view(), variances)
     }
 
-    /// What the targets suggest at each anchor, by the rows in a place among the judged of which
+    /// What the targets suggest at each anchor, by the rows in a place among the validation rows of which
     /// `is_there`.
     pub(super) fn guesses_of_targets(&self, is_there: impl Fn(usize) -> bool) -> Array2<f64> {
         self.guesses(&self.targets, is_there)
     }
 
     /// What `targets`, of all rows, suggest at each anchor, by the known rows that are in a place among
-    /// the judged of which `is_there`.
+    /// the validation rows of which `is_there`.
     pub(super) fn guesses(
         &self,
         targets: &Array2<f64>,

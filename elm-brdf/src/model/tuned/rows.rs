@@ -21,8 +21,8 @@ pub(super) struct Rows {
     /// What strengths are relative to.
     pub(super) scale: f64,
     pub(super) folds: Vec<NormalEquations>,
-    /// The hidden-layer matrix of the judged rows.
-    pub(super) judged: Array2<f64>,
+    /// The hidden-layer matrix of the validation rows.
+    pub(super) validation: Array2<f64>,
 }
 
 impl Rows {
@@ -31,7 +31,7 @@ impl Rows {
         map: &FeatureMap<f64>,
         x: &Array2<f64>,
     ) -> Result<Self> {
-        let judged = map.transform(&x.select(Axis(0), problem.judged()))?;
+        let validation = map.transform(&x.select(Axis(0), problem.validation()))?;
         let of = |h: ArrayView2<'_, f64>, rows: &[usize]| {
             NormalEquations::of(
                 h,
@@ -43,14 +43,14 @@ impl Rows {
         let mut first = 0;
         for fold in problem.folds() {
             let range = Slice::from(first..first + fold.len());
-            folds.push(of(judged.slice_axis(Axis(0), range), fold));
+            folds.push(of(validation.slice_axis(Axis(0), range), fold));
             first += fold.len();
         }
         let mut parts = folds.iter();
         let mut total = parts.next().ok_or_else(no_fit)?.clone();
         parts.for_each(|part| total.add(part, 1.0));
         let mut is_judged = vec![false; x.nrows()];
-        for &row in problem.judged() {
+        for &row in problem.validation() {
             is_judged[row] = true;
         }
         let rest: Vec<usize> = (0..x.nrows()).filter(|&row| !is_judged[row]).collect();
@@ -62,7 +62,7 @@ impl Rows {
             scale: total.scale(),
             total,
             folds,
-            judged,
+            validation,
         })
     }
 

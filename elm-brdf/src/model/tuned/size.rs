@@ -36,8 +36,8 @@ impl Tuned {
         }
     }
 
-    /// The neurons that the limits allow, or `usual`. `drawn` says how many are drawn for so many to be
-    /// kept, which of them being a bit each.
+    /// The neurons that the limits allow, or `usual`. `drawn(n)` is the number of candidates
+    /// drawn to keep n; which of them are kept costs a bit each.
     pub(super) fn size(
         &self,
         usual: usize,
