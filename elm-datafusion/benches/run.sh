@@ -22,4 +22,5 @@ timed $fit "$rows" --neurons 500 -o "$folder/a.elm"
 timed $fit "$rows" --neurons 500 --lambda 1e-6 -o "$folder/b.elm"
 timed "$python" benches/sums_numpy.py "$rows" 500 "$threads"
 timed $fit "$groups" --group-by sensor --neurons 60 -o "$folder/groups.parquet"
+timed $fit "$groups" --group-by sensor --neurons 60 --lambda 1e-6 -o "$folder/groups.parquet"
 timed "$python" benches/groups_sklearn.py "$groups" 60

@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 use crate::sample::Sample;
 use crate::settings::Settings;
 
+/// Multiplications of a fit that are shared among threads; the threads of smaller ones have groups of their own.
+const MIN_SHARED: usize = 100_000_000;
+
 /// The rows of a group so far.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct State {
@@ -155,7 +158,13 @@ impl State {
             Held::Rows(values) => {
                 let rows = values.len() / self.columns.max(1);
                 let rows = ArrayView2::from_shape((rows, self.columns), values);
-                fit_rows(rows.map_err(|_| Failure::OtherState)?, settings)
+                let rows = rows.map_err(|_| Failure::OtherState)?;
+                let columns = settings.params.neurons().saturating_add(self.columns);
+                let work = columns.saturating_mul(columns).saturating_mul(rows.nrows());
+                if work < MIN_SHARED {
+                    return elm::on_this_thread(|| fit_rows(rows, settings));
+                }
+                fit_rows(rows, settings)
             }
         }
     }

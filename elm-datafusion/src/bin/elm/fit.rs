@@ -7,11 +7,11 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use datafusion::arrow::array::{Array, AsArray, RecordBatch};
-use datafusion::arrow::datatypes::DataType;
+use datafusion::arrow::datatypes::{DataType, Int64Type};
 use datafusion::common::Column;
 use datafusion::dataframe::DataFrame;
 use datafusion::functions_aggregate::expr_fn::count;
-use datafusion::logical_expr::{AggregateUDF, Expr, cast, ident, lit};
+use datafusion::logical_expr::{AggregateUDF, Expr, cast, ident, lit, when};
 use datafusion::prelude::SessionContext;
 use elm::solve::Ridge;
 use elm::{Activation, Dataset, ElmParams, persist};
@@ -79,6 +79,17 @@ enum OnNull {
     Error,
 }
 
+/// What a first pass found.
+#[derive(Default)]
+struct FirstPass {
+    /// Rows without NULL.
+    rows: u64,
+    skipped: u64,
+    /// Rows of the largest group.
+    largest: u64,
+    sample: Option<Sample>,
+}
+
 impl Fit {
     pub(crate) async fn run(self, embedded: &SessionContext) -> Result<(), Failure> {
         self.check_output()?;
@@ -94,24 +105,20 @@ impl Fit {
             OnNull::Skip => Nulls::Skip,
             OnNull::Error => Nulls::Error,
         };
-        let leading = self.target.len() + usize::from(self.weight.is_some());
-        let sample = ElmSample::new(leading, self.weight.is_some(), nulls);
-        let sample = AggregateUDF::from(sample).call(arguments.clone());
-        let sample = table.rows.clone().aggregate(Vec::new(), vec![sample])?;
-        let sample: Sample = persist::from_bytes(cell(&sample.collect().await?, 0)?)?;
-        if sample.rows() == 0 {
-            let skipped = sample.skipped();
+        let first = self.first_pass(&table.rows, &arguments, nulls).await?;
+        if first.rows == 0 {
             return Err(Failure::new(format!(
-                "no rows to fit ({skipped} with NULL were skipped)"
+                "no rows to fit ({} with NULL were skipped)",
+                first.skipped
             )));
         }
-        (columns.rows, columns.skipped) = (sample.rows(), sample.skipped());
-        let mut settings = Settings::new(self.params(&sample)?);
+        (columns.rows, columns.skipped) = (first.rows, first.skipped);
+        let mut settings = Settings::new(self.params(first.sample.as_ref())?);
         settings.targets = self.target.len();
         settings.weighted = self.weight.is_some();
         settings.nulls = nulls;
         settings.group_rows = self.group_rows;
-        let batches = self.fit(table.rows, arguments, settings, sample).await?;
+        let batches = self.fit(table.rows, arguments, settings, first).await?;
         let what = if self.group_by.is_empty() {
             let model = persist::from_bytes(cell(&batches, 0)?)?;
             persist::save(
@@ -272,8 +279,62 @@ impl Fit {
         Ok(arguments.into_iter().map(Expr::unalias).collect())
     }
 
-    fn params(&self, sample: &Sample) -> Result<ElmParams<f64>, Failure> {
-        if self.neurons == "auto" {
+    /// What must be known of all rows before they are fitted: of groups that are kept as rows their sizes alone.
+    async fn first_pass(
+        &self,
+        rows: &DataFrame,
+        arguments: &[Expr],
+        nulls: Nulls,
+    ) -> Result<FirstPass, Failure> {
+        if !self.group_by.is_empty() && self.neurons != "auto" {
+            let sizes = self.group_sizes(rows, arguments).await?;
+            if sizes.largest <= self.group_rows as u64 {
+                return Ok(sizes);
+            }
+        }
+        let leading = self.target.len() + usize::from(self.weight.is_some());
+        let sample = ElmSample::new(leading, self.weight.is_some(), nulls);
+        let sample = AggregateUDF::from(sample).call(arguments.to_vec());
+        let sample = rows.clone().aggregate(Vec::new(), vec![sample])?;
+        let sample: Sample = persist::from_bytes(cell(&sample.collect().await?, 0)?)?;
+        Ok(FirstPass {
+            rows: sample.rows(),
+            skipped: sample.skipped(),
+            largest: sample.rows(),
+            sample: Some(sample),
+        })
+    }
+
+    async fn group_sizes(
+        &self,
+        rows: &DataFrame,
+        arguments: &[Expr],
+    ) -> Result<FirstPass, Failure> {
+        let nulls = arguments.iter().map(|argument| argument.clone().is_null());
+        let is_skipped = nulls.reduce(Expr::or).unwrap_or_else(|| lit(false));
+        let skipped = count(when(is_skipped, lit(1)).end()?);
+        let groups: Vec<Expr> = self.group_by.iter().map(ident).collect();
+        let counts = vec![count(lit(1)).alias("rows"), skipped.alias("skipped")];
+        let batches = rows.clone().aggregate(groups, counts)?.collect().await?;
+        let (mut all, mut found) = (0, FirstPass::default());
+        for batch in batches {
+            let column = |back: usize| {
+                let column = batch.columns().iter().rev().nth(back);
+                let column = column.and_then(|column| column.as_primitive_opt::<Int64Type>());
+                column.ok_or_else(|| Failure::new("expected a count of rows"))
+            };
+            let (rows, skipped) = (column(1)?.values(), column(0)?.values());
+            all += rows.iter().sum::<i64>().unsigned_abs();
+            found.skipped += skipped.iter().sum::<i64>().unsigned_abs();
+            let largest = rows.iter().copied().max().unwrap_or_default();
+            found.largest = found.largest.max(largest.unsigned_abs());
+        }
+        found.rows = all - found.skipped;
+        Ok(found)
+    }
+
+    fn params(&self, sample: Option<&Sample>) -> Result<ElmParams<f64>, Failure> {
+        if let Some(sample) = sample.filter(|_| self.neurons == "auto") {
             let rows = sample.matrix();
             let leading = self.target.len() + usize::from(self.weight.is_some());
             let (t, x) = (
@@ -311,11 +372,11 @@ impl Fit {
         rows: DataFrame,
         arguments: Vec<Expr>,
         settings: Settings,
-        sample: Sample,
+        first: FirstPass,
     ) -> Result<Vec<RecordBatch>, Failure> {
-        let expected = sample.rows() + sample.skipped();
+        let expected = first.rows + first.skipped;
         let bar = progress(expected);
-        let fit = ElmFit::new(settings, Some(sample));
+        let fit = ElmFit::new(settings, first.sample);
         let watched = watch(bar.clone(), fit.progress());
         let groups: Vec<Expr> = self.group_by.iter().map(ident).collect();
         let call = AggregateUDF::from(fit).call(arguments).alias(MODEL);
