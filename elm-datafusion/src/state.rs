@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::sample::Sample;
 use crate::settings::Settings;
 
-/// Multiplications of a fit that are shared among threads; the threads of smaller ones have groups of their own.
+/// Multiplications of a fit that are shared among threads; threads of smaller ones have groups of their own.
 const MIN_SHARED: usize = 100_000_000;
 
 /// The rows of a group so far.

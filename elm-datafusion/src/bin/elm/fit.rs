@@ -279,7 +279,7 @@ impl Fit {
         Ok(arguments.into_iter().map(Expr::unalias).collect())
     }
 
-    /// What must be known of all rows before they are fitted: of groups that are kept as rows their sizes alone.
+    /// What must be known of all rows before they are fitted: of groups kept as rows their sizes alone.
     async fn first_pass(
         &self,
         rows: &DataFrame,
