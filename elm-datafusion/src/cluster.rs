@@ -27,12 +27,14 @@ use crate::options::ElmOptions;
 use crate::predict::ElmPredict;
 use crate::sample::{ElmSample, Sample};
 use crate::settings::Settings;
+use crate::with_fixed_partitions;
 
 /// A session's configuration for a client, a scheduler or an executor: plans with this package's functions
-/// can be sent and read, and adaptive planning is off, as it loses or repeats results when an executor dies.
+/// can be sent and read, rows are dealt to `partitions` as [`with_fixed_partitions`] says, and adaptive planning
+/// is off, as it hangs when an executor dies.
 #[must_use]
-pub fn cluster_config() -> SessionConfig {
-    let mut config = SessionConfig::new_with_ballista()
+pub fn cluster_config(partitions: usize) -> SessionConfig {
+    let mut config = with_fixed_partitions(SessionConfig::new_with_ballista(), partitions)
         .with_ballista_logical_extension_codec(logical_codec())
         .with_ballista_physical_extension_codec(physical_codec())
         .with_ballista_adaptive_query_planner(false);

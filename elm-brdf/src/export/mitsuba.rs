@@ -87,7 +87,10 @@ pub fn plugin(model: &BrdfModel, module: &str, name: &str) -> Result<String> {
             grained("The grain\ncounts from the tangent dp/du. "),
         ),
         ("@ROW@", row.to_owned()),
-        ("@SINGLE@", format!("{:.0e}", cost.rmse / cost.scale)),
+        (
+            "@SINGLE@",
+            format!("{:.0e}", cost.rmse / cost.scale.max(f64::MIN_POSITIVE)),
+        ),
         (
             "@CHANNELS@",
             match &channels {

@@ -151,10 +151,10 @@ impl Network {
                 let (weights, center) = scaling.radial(&scales.to_vec(), &own);
                 neurons.push(Neuron {
                     activation: activation.to_owned(),
-                    center: Some(in_range("a center", center)?),
-                    weights: in_range("a scale", weights)?,
+                    center: Some(all_in_range("a center", center)?),
+                    weights: all_in_range("a scale", weights)?,
                     bias: 0.0,
-                    beta: in_range("an output weight", betas)?,
+                    beta: all_in_range("an output weight", betas)?,
                 });
                 continue;
             }
@@ -166,10 +166,10 @@ impl Network {
             }
             neurons.push(Neuron {
                 activation: activation.to_owned(),
-                weights: in_range("a hidden weight", weights)?,
-                bias: number("a hidden bias", bias)?,
+                weights: all_in_range("a hidden weight", weights)?,
+                bias: in_range("a hidden bias", bias)?,
                 center: None,
-                beta: in_range("an output weight", betas)?,
+                beta: all_in_range("an output weight", betas)?,
             });
         }
         // With direct links the inputs' rows follow the neurons'.
@@ -191,8 +191,8 @@ impl Network {
             outputs: outputs
                 .map(|(constant, linear)| {
                     Ok(Output {
-                        constant: number("an intercept", constant)?,
-                        linear: in_range("a direct link", linear)?,
+                        constant: in_range("an intercept", constant)?,
+                        linear: all_in_range("a direct link", linear)?,
                     })
                 })
                 .collect::<Result<_, ExportError>>()?,
@@ -218,7 +218,7 @@ impl Network {
             |outputs: &[f64]| -> Vec<f64> { places.iter().map(|&p| weights(outputs, p)).collect() };
         for neuron in &mut self.neurons {
             let beta = of_channels(&neuron.beta);
-            neuron.beta = in_range("an output weight", beta)?;
+            neuron.beta = all_in_range("an output weight", beta)?;
         }
         let constants: Vec<f64> = self.outputs.iter().map(|output| output.constant).collect();
         let constants = of_channels(&constants);
@@ -235,8 +235,8 @@ impl Network {
             .zip(linear)
             .map(|((&place, constant), linear)| {
                 Ok(Output {
-                    constant: number("an intercept", constant + mean(place))?,
-                    linear: in_range("a direct link", linear)?,
+                    constant: in_range("an intercept", constant + mean(place))?,
+                    linear: all_in_range("a direct link", linear)?,
                 })
             })
             .collect::<Result<_, ExportError>>()?;
@@ -263,13 +263,13 @@ fn values(model: &BrdfModel) -> Result<Values, ExportError> {
         };
         let [r, g, b] = *color;
         Ok(Wavelength {
-            mean: number("a mean target", mean)?,
-            axes: in_range("an axis", axes)?,
+            mean: in_range("a mean target", mean)?,
+            axes: all_in_range("an axis", axes)?,
             transform: of_channel,
             color: [
-                number("a colour", r)?,
-                number("a colour", g)?,
-                number("a colour", b)?,
+                in_range("a colour", r)?,
+                in_range("a colour", g)?,
+                in_range("a colour", b)?,
             ],
         })
     };
@@ -292,7 +292,7 @@ fn turned(features: Features, mut weights: Vec<f64>) -> Vec<f64> {
 }
 
 /// The number, if single precision has its range.
-fn number(what: &'static str, value: f64) -> Result<f64, ExportError> {
+fn in_range(what: &'static str, value: f64) -> Result<f64, ExportError> {
     if (value as f32).is_finite() {
         Ok(value)
     } else {
@@ -300,9 +300,9 @@ fn number(what: &'static str, value: f64) -> Result<f64, ExportError> {
     }
 }
 
-fn in_range(what: &'static str, values: Vec<f64>) -> Result<Vec<f64>, ExportError> {
+fn all_in_range(what: &'static str, values: Vec<f64>) -> Result<Vec<f64>, ExportError> {
     for &value in &values {
-        number(what, value)?;
+        in_range(what, value)?;
     }
     Ok(values)
 }

@@ -187,11 +187,11 @@ impl Writer<'_> {
 
 /// Offset and ceiling of a transform, 0 where it has none.
 fn range(transform: Channel) -> (f64, f64) {
-    let single = |value: f64| value.min(f64::from(f32::MAX));
+    let bounded = |value: f64| value.min(f64::from(f32::MAX));
     match transform {
         Channel::Identity => (0.0, 0.0),
-        Channel::Log { offset, ceiling } => (single(offset), single(ceiling)),
-        Channel::CubeRoot { ceiling } => (0.0, single(ceiling)),
+        Channel::Log { offset, ceiling } => (bounded(offset), bounded(ceiling)),
+        Channel::CubeRoot { ceiling } => (0.0, bounded(ceiling)),
     }
 }
 

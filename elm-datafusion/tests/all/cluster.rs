@@ -66,15 +66,15 @@ impl Cluster {
             _scheduler: scheduler,
         }
     }
-
-    /// `elm fit` of all rows to a file.
-    fn fit(&self, folder: &Path, rest: &[&str], output: &str) -> Output {
-        let limit = ["--cluster", &self.address, "--time-limit", "60"];
-        elm(folder, &[&FIT, rest, &["-o", output], &limit].concat())
-    }
 }
 
 const FIT: [&str; 4] = ["fit", "rows-*.parquet", "--target", "y"];
+
+/// `elm fit` of all rows to a file, by the cluster at this address.
+fn fit(folder: &Path, address: &str, seconds: &str, rest: &[&str], output: &str) -> Output {
+    let limit = ["--cluster", address, "--time-limit", seconds];
+    elm(folder, &[&FIT, rest, &["-o", output], &limit].concat())
+}
 
 /// Four files of ten thousand rows.
 fn rows(folder: &Path) {
@@ -124,7 +124,7 @@ fn a_killed_executor_changes_nothing_or_is_an_error() {
         };
         let cluster = Cluster::start(folder, 3);
         let start = Instant::now();
-        let output = cluster.fit(folder, rest, &theirs);
+        let output = fit(folder, &cluster.address, "60", rest, &theirs);
         let whole = start.elapsed();
         assert!(output.status.success(), "{output:?}");
         assert!(models(&own) == models(&theirs));
@@ -137,7 +137,7 @@ fn a_killed_executor_changes_nothing_or_is_an_error() {
                 std::thread::sleep(whole.mul_f64(part));
                 killed.kill();
             });
-            let output = cluster.fit(folder, rest, &theirs);
+            let output = fit(folder, &cluster.address, "60", rest, &theirs);
             killer.join().unwrap();
             if output.status.success() {
                 assert!(models(&own) == models(&theirs), "killed after {part}");
@@ -157,19 +157,18 @@ fn what_a_cluster_lacks_is_one_clear_error() {
     let nobody = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = nobody.local_addr().unwrap();
     drop(nobody);
-    let mut cluster = Cluster::start(folder, 0);
-    let of_nobody = Cluster {
-        address: address.to_string(),
-        executors: Vec::new(),
-        _scheduler: Running::start(folder, &["scheduler", "--port", "0"]).0,
+    let refusal = |address: &str, seconds: &str| {
+        let output = fit(folder, address, seconds, &[], "m.elm");
+        refused(folder, &output, "m.elm")
     };
-    let error = refused(folder, &of_nobody.fit(folder, &[], "m.elm"), "m.elm");
+    let error = refusal(&address.to_string(), "60");
     assert!(
         error.contains(&format!("no scheduler at {address}")),
         "{error}"
     );
 
     // Ballista's own executor, which has not the functions.
+    let cluster = Cluster::start(folder, 0);
     let port = cluster.address.rsplit_once(':').unwrap().1.parse().unwrap();
     let config = ExecutorProcessConfig {
         port: address.port(),
@@ -181,14 +180,11 @@ fn what_a_cluster_lacks_is_one_clear_error() {
     let runtime = tokio::runtime::Runtime::new().unwrap();
     runtime.spawn(start_executor_process(Arc::new(config)));
     std::thread::sleep(Duration::from_secs(1));
-    let error = refused(folder, &cluster.fit(folder, &[], "m.elm"), "m.elm");
+    let error = refusal(&cluster.address, "60");
     println!("{error}");
     assert!(error.contains("elm_sample"), "{error}");
     runtime.shutdown_background();
 
-    cluster.executors.clear();
-    let limit = ["--cluster", &cluster.address, "--time-limit", "2"];
-    let output = elm(folder, &[&FIT[..], &["-o", "m.elm"], &limit].concat());
-    let error = refused(folder, &output, "m.elm");
+    let error = refusal(&cluster.address, "2");
     assert!(error.contains("no result within 2 s"), "{error}");
 }

@@ -107,6 +107,11 @@ fn one_network_per_group() {
     );
     let error = bad(folder, &[&fit[..], &["-o", "models.elm"]].concat());
     assert!(error.contains(".parquet"), "{error}");
+    // Its own columns have names that no file's have.
+    let query = "SELECT a, b, y, sensor AS rows FROM 'rows.csv'";
+    good(folder, &["sql", query, "-o", "named.csv"]);
+    let fit = ["fit", "named.csv", "--target", "y", "--group-by", "rows"];
+    good(folder, &[&fit[..], &["-o", "named.parquet"]].concat());
 }
 
 #[test]

@@ -29,6 +29,7 @@ use crate::{PARTITIONS, environment};
 
 /// Bytes of a message: a plan holds a sample of the rows, and a state is at most some ten megabytes.
 const MESSAGE: u32 = 256 << 20;
+const PORT: u16 = 50050;
 /// Seconds without a sign of life after which an executor is taken for dead.
 const SILENCE: u64 = 10;
 
@@ -52,13 +53,17 @@ impl Cluster {
         let Some(address) = &self.cluster else {
             return Ok(embedded.clone());
         };
-        let state = state(cluster_config())?;
-        let connected = SessionContext::remote_with_state(&format!("df://{address}"), state).await;
-        let context = connected.map_err(|reason| Failure::at(address, reason))?;
-        reach(address).await?;
+        let (host, port) = reach(address).await?;
+        let url = format!("df://{host}:{port}");
+        let connected = SessionContext::remote_with_state(&url, state(config())?).await;
+        let context = connected.map_err(|reason| Failure::at(address, Failure::from(reason)))?;
         let context = context.enable_url_table();
         elm_datafusion::register(&context)?;
         Ok(context)
+    }
+
+    pub(crate) fn is_used(&self) -> bool {
+        self.cluster.is_some()
     }
 
     /// The result of work, or an error when the time for it is up.
@@ -82,27 +87,29 @@ impl Cluster {
     }
 }
 
-/// An error at once where there is no scheduler.
-async fn reach(address: &str) -> Result<(), Failure> {
-    let with_port = if address.contains(':') {
-        address.to_owned()
-    } else {
-        format!("{address}:50050")
+/// The host and the port of a scheduler, or an error at once where there is none.
+async fn reach(address: &str) -> Result<(&str, u16), Failure> {
+    let (host, port) = match address.rsplit_once(':') {
+        Some((host, port)) => (host, port.parse().ok()),
+        None => (address, Some(PORT)),
     };
-    let connected = tokio::net::TcpStream::connect(&with_port);
+    let port = port.ok_or_else(|| Failure::at(address, "expected HOST or HOST:PORT"))?;
+    let place = format!("no scheduler at {host}:{port}");
+    let connected = tokio::net::TcpStream::connect((host, port));
     match tokio::time::timeout(Duration::from_secs(SILENCE), connected).await {
-        Ok(Ok(_)) => Ok(()),
-        Ok(Err(reason)) => Err(Failure::at(format!("no scheduler at {with_port}"), reason)),
-        Err(_) => Err(Failure::at(
-            format!("no scheduler at {with_port}"),
-            "no answer",
-        )),
+        Ok(Ok(_)) => Ok((host, port)),
+        Ok(Err(reason)) => Err(Failure::at(place, reason)),
+        Err(_) => Err(Failure::at(place, "no answer")),
     }
 }
 
-fn state(config: SessionConfig) -> Result<SessionState, Failure> {
+fn config() -> SessionConfig {
+    cluster_config(PARTITIONS)
+}
+
+fn state(config: SessionConfig) -> datafusion::error::Result<SessionState> {
     Ok(SessionStateBuilder::new()
-        .with_config(elm_datafusion::with_fixed_partitions(config, PARTITIONS))
+        .with_config(config)
         .with_runtime_env(environment()?)
         .with_default_features()
         .build())
@@ -148,7 +155,8 @@ pub(crate) struct Scheduler {
     /// The address to listen at
     #[arg(long, default_value = "127.0.0.1")]
     host: String,
-    #[arg(long, default_value_t = 50050)]
+    /// The port to listen at; 0 for a free one
+    #[arg(long, default_value_t = PORT)]
     port: u16,
 }
 
@@ -161,7 +169,7 @@ impl Scheduler {
         let address = listener
             .local_addr()
             .map_err(|reason| Failure::at(&place, reason))?;
-        let config = SchedulerConfig {
+        let settings = SchedulerConfig {
             external_host: self.host,
             bind_host: address.ip().to_string(),
             bind_port: address.port(),
@@ -171,14 +179,9 @@ impl Scheduler {
             grpc_server_max_decoding_message_size: MESSAGE,
             grpc_server_max_encoding_message_size: MESSAGE,
             grpc_client_max_message_size: MESSAGE,
-            override_config_producer: Some(Arc::new(cluster_config)),
+            override_config_producer: Some(Arc::new(config)),
             override_session_builder: Some(Arc::new(|config: SessionConfig| {
-                let state = SessionStateBuilder::new()
-                    .with_config(config)
-                    .with_runtime_env(environment()?)
-                    .with_default_features()
-                    .build();
-                let context = SessionContext::new_with_state(state);
+                let context = SessionContext::new_with_state(state(config)?);
                 elm_datafusion::register_functions(&context);
                 Ok(context.state())
             })),
@@ -187,10 +190,10 @@ impl Scheduler {
             ..SchedulerConfig::default()
         };
         let failed = |reason: &dyn std::fmt::Display| Failure::at("scheduler", reason);
-        let cluster = BallistaCluster::new_from_config(&config);
+        let cluster = BallistaCluster::new_from_config(&settings);
         let cluster = cluster.await.map_err(|reason| failed(&reason))?;
         let scheduler =
-            create_scheduler::<LogicalPlanNode, PhysicalPlanNode>(cluster, Arc::new(config));
+            create_scheduler::<LogicalPlanNode, PhysicalPlanNode>(cluster, Arc::new(settings));
         let scheduler = scheduler.await.map_err(|reason| failed(&reason))?;
         print(&format!("scheduler at {address}"))?;
         let served = start_grpc_service_with_listener(listener, scheduler).await;
@@ -211,26 +214,17 @@ pub(crate) struct Executor {
 
 impl Executor {
     pub(crate) async fn run(self, threads: NonZeroUsize) -> Result<(), Failure> {
-        let (host, port) = match self.scheduler.rsplit_once(':') {
-            Some((host, port)) => {
-                let port = port
-                    .parse()
-                    .map_err(|_| Failure::at(&self.scheduler, "expected HOST or HOST:PORT"))?;
-                (host.to_owned(), port)
-            }
-            None => (self.scheduler.clone(), 50050),
-        };
-        reach(&format!("{host}:{port}")).await?;
+        let (host, port) = reach(&self.scheduler).await?;
         let own = free_port(&self.host)?;
         let runtime: Arc<RuntimeEnv> = environment()?;
         // Results of other executors' work wait here. Gone when this process ends.
         let folder = tempfile::Builder::new().prefix("elm-executor-").tempdir();
         let folder = folder.map_err(|reason| Failure::at("no temporary folder", reason))?;
-        let config = ExecutorProcessConfig {
+        let settings = ExecutorProcessConfig {
             bind_host: own.ip().to_string(),
             external_host: Some(self.host),
             port: own.port(),
-            scheduler_host: host,
+            scheduler_host: host.to_owned(),
             scheduler_port: port,
             vcores: threads.get(),
             work_dir: Some(folder.path().to_string_lossy().into_owned()),
@@ -242,13 +236,13 @@ impl Executor {
             override_runtime_producer: Some(Arc::new(move |_: &SessionConfig| {
                 Ok(Arc::clone(&runtime))
             })),
-            override_config_producer: Some(Arc::new(cluster_config)),
+            override_config_producer: Some(Arc::new(config)),
             override_logical_codec: Some(logical_codec()),
             override_physical_codec: Some(physical_codec()),
             ..ExecutorProcessConfig::default()
         };
         print(&format!("executor at {own} of {}", self.scheduler))?;
-        let run = start_executor_process(Arc::new(config)).await;
+        let run = start_executor_process(Arc::new(settings)).await;
         run.map_err(|reason| Failure::at("executor", reason))
     }
 }

@@ -72,7 +72,8 @@ async fn expand(context: &SessionContext, patterns: &[String]) -> Result<Vec<Str
 
 /// The store that a file is in.
 fn root(path: &str) -> Result<ObjectStoreUrl, Failure> {
-    let url = ListingTableUrl::parse(path).map_err(|reason| Failure::at(path, reason))?;
+    let url = ListingTableUrl::parse(path);
+    let url = url.map_err(|reason| Failure::at(path, Failure::from(reason)))?;
     Ok(url.object_store())
 }
 

@@ -25,6 +25,9 @@ use crate::failure::Failure;
 use crate::files::{Kind, Table, is_text};
 use crate::models::{self, MODEL};
 
+/// The column that counts the rows of networks: a name that no column of the user's has.
+const ROWS: &str = "elm rows";
+
 /// Arguments of `elm fit`.
 #[derive(Debug, Args)]
 pub(crate) struct Fit {
@@ -85,8 +88,6 @@ struct FirstPass {
     /// Rows without NULL.
     rows: u64,
     skipped: u64,
-    /// Rows of the largest group.
-    largest: u64,
     sample: Option<Sample>,
 }
 
@@ -286,11 +287,11 @@ impl Fit {
         arguments: &[Expr],
         nulls: Nulls,
     ) -> Result<FirstPass, Failure> {
-        if !self.group_by.is_empty() && self.neurons != "auto" {
-            let sizes = self.group_sizes(rows, arguments).await?;
-            if sizes.largest <= self.group_rows as u64 {
-                return Ok(sizes);
-            }
+        if !self.group_by.is_empty()
+            && self.neurons != "auto"
+            && let Some(sizes) = self.small_groups(rows, arguments).await?
+        {
+            return Ok(sizes);
         }
         let leading = self.target.len() + usize::from(self.weight.is_some());
         let sample = ElmSample::new(leading, self.weight.is_some(), nulls);
@@ -300,21 +301,20 @@ impl Fit {
         Ok(FirstPass {
             rows: sample.rows(),
             skipped: sample.skipped(),
-            largest: sample.rows(),
             sample: Some(sample),
         })
     }
 
-    async fn group_sizes(
+    /// The sizes of all groups, where each is to be kept as rows.
+    async fn small_groups(
         &self,
         rows: &DataFrame,
         arguments: &[Expr],
-    ) -> Result<FirstPass, Failure> {
+    ) -> Result<Option<FirstPass>, Failure> {
         let nulls = arguments.iter().map(|argument| argument.clone().is_null());
-        let is_skipped = nulls.reduce(Expr::or).unwrap_or_else(|| lit(false));
-        let skipped = count(when(is_skipped, lit(1)).end()?);
+        let skipped = count(when(any(nulls.collect()), lit(1)).end()?);
         let groups: Vec<Expr> = self.group_by.iter().map(ident).collect();
-        let counts = vec![count(lit(1)).alias("rows"), skipped.alias("skipped")];
+        let counts = vec![count(lit(1)).alias(ROWS), skipped.alias("elm skipped")];
         let batches = rows.clone().aggregate(groups, counts)?.collect().await?;
         let (mut all, mut found) = (0, FirstPass::default());
         for batch in batches {
@@ -326,11 +326,15 @@ impl Fit {
             let (rows, skipped) = (column(1)?.values(), column(0)?.values());
             all += rows.iter().sum::<i64>().unsigned_abs();
             found.skipped += skipped.iter().sum::<i64>().unsigned_abs();
-            let largest = rows.iter().copied().max().unwrap_or_default();
-            found.largest = found.largest.max(largest.unsigned_abs());
+            if rows
+                .iter()
+                .any(|&rows| rows.unsigned_abs() > self.group_rows as u64)
+            {
+                return Ok(None);
+            }
         }
         found.rows = all - found.skipped;
-        Ok(found)
+        Ok(Some(found))
     }
 
     fn params(&self, sample: Option<&Sample>) -> Result<ElmParams<f64>, Failure> {
@@ -375,17 +379,32 @@ impl Fit {
         first: FirstPass,
     ) -> Result<Vec<RecordBatch>, Failure> {
         let expected = first.rows + first.skipped;
-        let bar = progress(expected);
+        // Executors do not say how far they are.
+        let bar = match self.cluster.is_used() {
+            true => ProgressBar::hidden(),
+            false => progress(expected),
+        };
         let fit = ElmFit::new(settings, first.sample);
         let watched = watch(bar.clone(), fit.progress());
         let groups: Vec<Expr> = self.group_by.iter().map(ident).collect();
         let call = AggregateUDF::from(fit).call(arguments).alias(MODEL);
-        let count = count(lit(1)).alias("rows");
+        let count = count(lit(1)).alias(ROWS);
         let fitted = rows.aggregate(groups, vec![call, count])?.collect().await;
         watched.abort();
         bar.finish_and_clear();
         cluster::checked(fitted?, self.group_by.len(), expected)
     }
+}
+
+/// Whether any is true, as a tree that is not deep.
+fn any(mut all: Vec<Expr>) -> Expr {
+    while all.len() > 1 {
+        let pairs = all.chunks(2);
+        all = pairs
+            .filter_map(|pair| pair.iter().cloned().reduce(Expr::or))
+            .collect();
+    }
+    all.pop().unwrap_or_else(|| lit(false))
 }
 
 /// A column of NULLs alone is one of numbers, none of which is there.

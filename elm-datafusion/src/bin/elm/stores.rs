@@ -74,20 +74,20 @@ pub(crate) fn is_url(name: &str) -> bool {
 
 /// The files that a URL stands for, which may hold a pattern, in order.
 pub(crate) async fn list(context: &SessionContext, url: &str) -> Result<Vec<String>, Failure> {
-    let at = |reason: &dyn std::fmt::Display| Failure::at(url, brief(reason));
+    let at = |reason: DataFusionError| Failure::at(url, Failure::from(reason));
     if url.contains('?') {
         return Err(Failure::at(url, "expected a URL without '?'"));
     }
-    let root = ListingTableUrl::parse(url).map_err(|reason| at(&reason))?;
+    let root = ListingTableUrl::parse(url).map_err(at)?;
     let root = root.object_store();
     let Some(first) = url.find(['*', '[']) else {
         return Ok(vec![url.to_owned()]);
     };
     let store = context.runtime_env().object_store(&root);
-    let store = store.map_err(|reason| at(&reason))?;
+    let store = store.map_err(at)?;
     let path = url.strip_prefix(root.as_str());
     let path = path.ok_or_else(|| Failure::at(url, format!("expected {root}...")))?;
-    let pattern = Pattern::new(path).map_err(|reason| at(&reason))?;
+    let pattern = Pattern::new(path).map_err(|reason| Failure::at(url, reason))?;
     let options = MatchOptions {
         require_literal_separator: true,
         ..MatchOptions::new()
@@ -98,7 +98,7 @@ pub(crate) async fn list(context: &SessionContext, url: &str) -> Result<Vec<Stri
         .list(folder.as_ref())
         .try_collect()
         .await
-        .map_err(|reason| at(&reason))?;
+        .map_err(|reason| at(reason.into()))?;
     let found = found.into_iter().map(|file| file.location.to_string());
     let mut files: Vec<String> = found
         .filter(|path| pattern.matches_with(path, options))
@@ -109,10 +109,4 @@ pub(crate) async fn list(context: &SessionContext, url: &str) -> Result<Vec<Stri
         return Err(Failure::at(url, "no such file"));
     }
     Ok(files)
-}
-
-/// The first line of what may be a page of an answer.
-fn brief(reason: &dyn std::fmt::Display) -> String {
-    let text = reason.to_string();
-    text.lines().next().unwrap_or_default().to_owned()
 }
