@@ -30,8 +30,8 @@ use crate::settings::Settings;
 use crate::with_fixed_partitions;
 
 /// A session's configuration for a client, a scheduler or an executor: plans with this package's functions
-/// can be sent and read, rows are dealt to `partitions` as [`with_fixed_partitions`] says, and adaptive planning
-/// is off, as it hangs when an executor dies.
+/// can be sent and read, rows are dealt to `partitions` as [`with_fixed_partitions`] says, and adaptive
+/// planning is off, as it hangs when an executor dies.
 #[must_use]
 pub fn cluster_config(partitions: usize) -> SessionConfig {
     let mut config = with_fixed_partitions(SessionConfig::new_with_ballista(), partitions)
