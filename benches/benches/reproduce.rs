@@ -57,7 +57,7 @@ fn reproduce(criterion: &mut Criterion) {
         let method: &dyn Fit<Model = BrdfModel> = if once { &scaled } else { &plain };
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
-                let fits = method.cross_fits(pairs, values.view(), &labels, 10, &mut |_| {});
+                let fits = method.cross_fits(pairs, values.view(), &labels, 10, &|_| {});
                 fits.map_or(0, |fits| fits.len())
             });
         });

@@ -1,5 +1,8 @@
 //! The traits of fitting: a method ([`Fit`]) makes a [`Model`] from measurements.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use elm::advanced::parallel_map;
 use elm_datasets::Brdf;
 use elm_datasets::brdf::{ArgumentError, EvalError};
 use elm_datasets::geometry::DirectionPair;
@@ -57,7 +60,8 @@ pub trait Fit: Send + Sync {
     /// it was fitted to: one array of shape (pairs, channels) per fold. `folds` has the fold of
     /// each pair, below `count`; `done` is told after each fold how many there have been.
     ///
-    /// Refits fold by fold, unless a method knows a shorter way.
+    /// Refits fold by fold, several at a time on several [threads](elm::on_threads), unless a method knows a
+    /// shorter way.
     ///
     /// # Errors
     /// Those of [`fit`](Self::fit) and of [`Brdf::eval`].
@@ -67,18 +71,20 @@ pub trait Fit: Send + Sync {
         values: ArrayView2<'_, f64>,
         folds: &[usize],
         count: usize,
-        done: &mut dyn FnMut(usize),
+        done: &(dyn Fn(usize) + Sync),
     ) -> Result<Vec<Array2<f64>>> {
+        let finished = AtomicUsize::new(0);
         let without = |fold: usize| {
             let other = |row: &usize| folds.get(*row) != Some(&fold);
             let left: Vec<usize> = (0..pairs.len()).filter(other).collect();
             let left_pairs: Vec<DirectionPair> = left.iter().map(|&row| pairs[row]).collect();
             let model = self.fit(&left_pairs, values.select(Axis(0), &left).view())?;
             let predicted = model.eval(pairs)?;
-            done(fold + 1);
+            done(finished.fetch_add(1, Ordering::Relaxed) + 1);
             Ok(predicted)
         };
-        (0..count).map(without).collect()
+        let fits = parallel_map((0..count).collect(), without);
+        fits.into_iter().collect()
     }
 }
 
@@ -105,7 +111,7 @@ impl<F: Fit + 'static> Fit for Boxed<F> {
         values: ArrayView2<'_, f64>,
         folds: &[usize],
         count: usize,
-        done: &mut dyn FnMut(usize),
+        done: &(dyn Fn(usize) + Sync),
     ) -> Result<Vec<Array2<f64>>> {
         self.0.cross_fits(pairs, values, folds, count, done)
     }

@@ -110,7 +110,7 @@ pub fn cross_validate(
     method: &(impl Fit + ?Sized),
     data: &Measurements,
     folds: &Folds,
-    mut done: impl FnMut(usize, usize),
+    done: impl Fn(usize, usize) + Sync,
 ) -> Result<Vec<MaterialScores>> {
     folds.check(data.directions.len())?;
     let groups = groups(&data.materials);
@@ -149,7 +149,7 @@ pub fn cross_validate_samples(
     name: &str,
     samples: &Samples,
     folds: &Folds,
-    mut done: impl FnMut(usize, usize),
+    done: impl Fn(usize, usize) + Sync,
 ) -> Result<MaterialScores> {
     folds.check(samples.directions.len())?;
     let rows: Vec<usize> = (0..samples.directions.len()).collect();
@@ -182,7 +182,7 @@ pub fn cross_validate_pooled(
     pool: &Measurements,
     data: &Measurements,
     folds: &Folds,
-    mut done: impl FnMut(usize, usize),
+    done: impl Fn(usize, usize) + Sync,
 ) -> Result<Vec<MaterialScores>> {
     let whole: Vec<&Material> = pool
         .materials
@@ -280,12 +280,12 @@ impl<'a> Group<'a> {
         &self,
         method: &(impl Fit + ?Sized),
         folds: &Folds,
-        mut done: impl FnMut(usize),
+        done: impl Fn(usize) + Sync,
     ) -> Result<(Array2<f64>, Vec<Scores>)> {
         let rows = self.rows.len();
         let labels: Vec<usize> = self.rows.iter().map(|&row| folds.of_row(row)).collect();
         let (pairs, values) = (&self.pairs, self.values.view());
-        let fits = method.cross_fits(pairs, values, &labels, folds.count, &mut done)?;
+        let fits = method.cross_fits(pairs, values, &labels, folds.count, &done)?;
         let held_out = Array2::from_shape_fn(values.dim(), |(row, column)| {
             fits[labels[row]][[row, column]]
         });

@@ -18,3 +18,4 @@
 
 pub use crate::feature_map::{FeatureMap, FeatureMapParams, HiddenLayer, NeuronBlock};
 pub use crate::stream::Stream;
+pub use crate::threads::map as parallel_map;

@@ -112,8 +112,14 @@ pub fn current_threads() -> usize {
     1
 }
 
-/// What becomes of each item, in their order.
-pub(crate) fn map<I: Send, R: Send>(items: Vec<I>, work: impl Fn(I) -> R + Sync) -> Vec<R> {
+/// What becomes of each item, in their order; items are shared among the threads that a call from here has
+/// (see [`on_threads`](crate::on_threads)).
+///
+/// ```
+/// use elm::advanced::parallel_map;
+/// assert_eq!(parallel_map(vec![1, 2, 3], |n| n * n), [1, 4, 9]);
+/// ```
+pub fn map<I: Send, R: Send>(items: Vec<I>, work: impl Fn(I) -> R + Sync) -> Vec<R> {
     map_with(items, || (), |(), item| work(item))
 }
 

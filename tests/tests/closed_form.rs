@@ -4,6 +4,8 @@
 // The lint knows test functions, but not the helpers beside them.
 #![allow(clippy::unwrap_used)]
 
+use std::sync::Mutex;
+
 use elm::solve::{PseudoInverse, Ridge, Solver};
 use elm::{Activation, Dataset, ElmParams, Scaler};
 use elm_brdf::features::Features;
@@ -93,9 +95,10 @@ fn where_nothing_is_scaled_scaling_once_is_scaling_in_each_fold() {
     };
     let each = cross_validate(&params, &data, &folds, |_, _| {}).unwrap();
     let once = GlobalScaling::new(params).unwrap();
-    let mut calls = Vec::new();
-    let once = cross_validate(&once, &data, &folds, |done, all| calls.push((done, all))).unwrap();
-    assert_eq!(calls, [(10, 10)]);
+    let calls = Mutex::new(Vec::new());
+    let done = |done, all| calls.lock().unwrap().push((done, all));
+    let once = cross_validate(&once, &data, &folds, done).unwrap();
+    assert_eq!(calls.into_inner().unwrap(), [(10, 10)]);
     for (a, b) in each.iter().zip(&once) {
         let limit = 1e-9 * largest(a.predicted.view());
         assert!(largest((&a.predicted - &b.predicted).view()) <= limit);

@@ -17,7 +17,7 @@ pub(super) fn cross_validate_with_prior(
     invalid: Invalid,
     seed: u64,
     folds: &Folds,
-    done: impl FnMut(usize, usize),
+    done: impl Fn(usize, usize) + Sync,
 ) -> Result<Vec<MaterialScores>, Failure> {
     let pool = source.load(&source.select("all")?, invalid)?;
     let params = PriorParams {

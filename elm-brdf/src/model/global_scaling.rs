@@ -47,7 +47,7 @@ impl Fit for GlobalScaling {
         values: ArrayView2<'_, f64>,
         folds: &[usize],
         count: usize,
-        done: &mut dyn FnMut(usize),
+        done: &(dyn Fn(usize) + Sync),
     ) -> Result<Vec<Array2<f64>>> {
         let x = self.0.features.compute_training(pairs);
         let network = self.0.network.clone().with_bounded(false);

@@ -17,7 +17,7 @@ mod rows;
 mod size;
 mod small_data;
 
-use elm::advanced::FeatureMap;
+use elm::advanced::{FeatureMap, parallel_map};
 
 use elm::{Activation, Biases, Dataset, Distribution, ElmParams, NeuronGroup, Scaler};
 use elm_datasets::brdf::{EvalError, check_arguments};
@@ -191,8 +191,9 @@ impl Tuned {
         let noise = search.noise(&transform)?;
         let raised = transform.raise_offsets(&noise);
         if raised.iter().any(|&factor| factor > 1.0) {
-            search = small_data::Search::new(self, pairs, values, &transform, direction)?;
+            search.retarget(pairs, values, &transform)?;
         }
+        search.refine()?;
         let anisotropic = search.is_anisotropic();
         transform = search.with_outputs(transform, pairs)?;
         let problem = self.problem(pairs, values, transform, noise, &raised, anisotropic)?;
@@ -271,9 +272,10 @@ impl Fit for Tuned {
 
     fn fit(&self, pairs: &[DirectionPair], values: ArrayView2<'_, f64>) -> Result<Self::Model> {
         check(pairs, values)?;
-        let channels = (0..values.ncols())
-            .map(|channel| self.fit_model(pairs, values.select(Axis(1), &[channel]).view()));
-        Ok(SideBySide(channels.collect::<Result<_>>()?))
+        let models = parallel_map((0..values.ncols()).collect(), |channel| {
+            self.fit_model(pairs, values.select(Axis(1), &[channel]).view())
+        });
+        Ok(SideBySide(models.into_iter().collect::<Result<_>>()?))
     }
 }
 

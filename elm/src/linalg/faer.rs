@@ -19,6 +19,7 @@ use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::linalg::{cholesky::llt, triangular_solve};
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::traits::RealField;
+use faer::traits::math_utils::one;
 use faer::{Accum, Conj, MatMut, MatRef, Par};
 use ndarray::{Array1, Array2, ArrayView2, Axis, CowArray, Ix2, ShapeBuilder, s};
 use num_traits::Zero;
@@ -88,7 +89,7 @@ fn product<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>, b: ArrayView2<'_, A
             Accum::Replace,
             left.subrows(number * slab, rows),
             right,
-            faer::traits::math_utils::one(),
+            one(),
             PAR,
         );
         clean(());
@@ -226,7 +227,6 @@ fn factorize_panel<A: RealField>(
     let (_, left) = left.rb().split_at_row(half);
     let (left_top, left_bottom) = left.split_at_row(width - half);
     let (right_top, right_bottom) = right.rb().split_at_row(width - half);
-    let one = faer::traits::math_utils::one::<A>;
     triangular::matmul(
         across.rb_mut(),
         BlockStructure::Rectangular,
@@ -325,17 +325,38 @@ fn solve_lower_transposed<A: RealField + Copy + Zero>(
     x
 }
 
+/// The inverse of a triangle, with nothing above its diagonal.
+fn inverse_of_lower<A: RealField + Copy + Zero>(l: &Array2<A>) -> Array2<A> {
+    let mut inverse = Array2::zeros(l.dim().f());
+    invert_lower_triangular(view_mut(&mut inverse), view(l.view()), PAR);
+    inverse
+}
+
+fn inverse_of_positive<A: RealField + Copy + Zero>(l: &Array2<A>) -> Array2<A> {
+    let half = inverse_of_lower(l);
+    let mut inverse = Array2::zeros(l.dim().f());
+    triangular::matmul(
+        view_mut(&mut inverse),
+        BlockStructure::TriangularLower,
+        Accum::Replace,
+        view(half.t()),
+        BlockStructure::TriangularUpper,
+        view(half.view()),
+        BlockStructure::TriangularLower,
+        one(),
+        PAR,
+    );
+    inverse
+}
+
 fn solve_positive<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
     a: ArrayView2<'_, A>,
     b: ArrayView2<'_, A>,
 ) -> Result<CholeskySolve<A>, Failure> {
-    let n = a.nrows();
     let factor = cholesky(by_columns(a))?;
     let x = solve_lower_transposed(&factor, solve_lower(&factor, b).view());
-    let lower = view(factor.view());
     // With A = L L^T the trace of the inverse is the sum of squares of L^-1.
-    let mut inverse = Array2::zeros((n, n).f());
-    invert_lower_triangular(view_mut(&mut inverse), lower, PAR);
+    let inverse = inverse_of_lower(&factor);
     let inverse_trace = inverse.iter().fold(A::zero(), |sum, &v| sum + v * v);
     Ok(CholeskySolve { x, inverse_trace })
 }
@@ -434,6 +455,10 @@ macro_rules! kernel {
                 b: ArrayView2<'_, Self>,
             ) -> Result<Array2<Self>, Failure> {
                 Ok(clean(solve_lower_transposed(l, b)))
+            }
+
+            fn inverse_of_positive(l: &Array2<Self>) -> Result<Array2<Self>, Failure> {
+                Ok(clean(inverse_of_positive(l)))
             }
         }
     )*};

@@ -124,6 +124,11 @@ fn solve_lower_transposed<A: Lapack<Real = A>>(
     solve_upper(l.t(), b)
 }
 
+fn inverse_of_positive<A: Lapack<Real = A>>(l: &Array2<A>) -> Result<Array2<A>, Failure> {
+    let half = solve_lower(l, Array2::eye(l.nrows()).view())?;
+    Ok(half.t().dot(&half))
+}
+
 fn solve_positive<A: Lapack<Real = A>>(
     a: ArrayView2<'_, A>,
     b: ArrayView2<'_, A>,
@@ -216,6 +221,11 @@ macro_rules! kernel {
             ) -> Result<Array2<Self>, Failure> {
                 sequential();
                 solve_lower_transposed(l, b)
+            }
+
+            fn inverse_of_positive(l: &Array2<Self>) -> Result<Array2<Self>, Failure> {
+                sequential();
+                inverse_of_positive(l)
             }
         }
     )*};

@@ -146,6 +146,9 @@ pub trait Backend: Sized {
         l: &Array2<Self>,
         b: ArrayView2<'_, Self>,
     ) -> Result<Array2<Self>, Failure>;
+
+    /// $(L L^T)^{-1}$, of which the lower half is to be read, as is that of $L$.
+    fn inverse_of_positive(l: &Array2<Self>) -> Result<Array2<Self>, Failure>;
 }
 
 #[cfg(test)]
@@ -285,6 +288,9 @@ mod tests {
             assert_abs_diff_eq!(both_halves(&gram), sum, epsilon = 1e-10);
             let solved = f64::solve_positive(p.view(), p.dot(&x).view()).unwrap();
             assert_abs_diff_eq!(solved.x, x, epsilon = 1e-9);
+            let factor = f64::cholesky(p.clone()).unwrap();
+            let inverse = both_halves(&f64::inverse_of_positive(&factor).unwrap());
+            assert_abs_diff_eq!(p.dot(&inverse), Array2::eye(n), epsilon = 1e-10);
             let s = f64::singular_values(a.view()).unwrap();
             let r = Array2::from_shape_fn((n, n), |(i, j)| if i <= j { a[[i, j]] } else { 0.0 });
             assert_abs_diff_eq!(

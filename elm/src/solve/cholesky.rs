@@ -58,6 +58,30 @@ impl<A: Scalar> Cholesky<A> {
         Ok(A::solve_lower(&self.lower, b.view())?)
     }
 
+    /// $A^{-1}$, both of its halves, for less than [`solve`](Self::solve) with the identity costs.
+    ///
+    /// ```
+    /// use elm::solve::Cholesky;
+    /// use ndarray::{Array2, array};
+    ///
+    /// let a = array![[4.0_f64, 2.0], [2.0, 3.0]];
+    /// let inverse = Cholesky::new(a.clone())?.inverse()?;
+    /// assert!((a.dot(&inverse) - Array2::eye(2)).iter().all(|v| v.abs() < 1e-14));
+    /// # Ok::<(), elm::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`] where a pivot is nothing.
+    pub fn inverse(&self) -> Result<Array2<A>> {
+        let mut inverse = A::inverse_of_positive(&self.lower)?;
+        for row in 0..inverse.nrows() {
+            for column in row + 1..inverse.nrows() {
+                inverse[[row, column]] = inverse[[column, row]];
+            }
+        }
+        Ok(inverse)
+    }
+
     /// $\ln \det A$.
     #[must_use]
     pub fn log_determinant(&self) -> A {

@@ -7,8 +7,8 @@
 //! has a gradient, by which the scale of each input and the noise are found (C. Rasmussen, C. Williams,
 //! *Gaussian Processes for Machine Learning*, 2006, chapters 2, 4 and 5).
 
-use elm::Distribution;
 use elm::solve::Cholesky;
+use elm::{Activation, Distribution};
 use ndarray::{Array1, Array2, Axis, Zip};
 
 use super::errors::no_fit;
@@ -50,26 +50,53 @@ impl Smoothness {
             Self::Infinite => Distribution::Normal,
         }
     }
+}
 
-    /// The correlation at a squared distance.
-    fn correlation(self, squared: f64) -> f64 {
-        match self {
-            Self::Twice => {
-                let r = (5.0 * squared).sqrt();
-                (1.0 + r + r * r / 3.0) * (-r).exp()
-            }
-            Self::Infinite => (-0.5 * squared).exp(),
+/// What the covariance of the rows of two matrices is made of.
+struct Decay {
+    smoothness: Smoothness,
+    /// $r = \sqrt 5 d$ of Matérn's covariance, $d^2 / 2$ of the normal one, where rows are $d$ apart.
+    distance: Array2<f64>,
+    /// $e^{-r}$, or $e^{-d^2 / 2}$.
+    decay: Array2<f64>,
+}
+
+impl Decay {
+    fn between(smoothness: Smoothness, a: &Array2<f64>, b: &Array2<f64>) -> Self {
+        let mut distance = squared_distances(a, b);
+        match smoothness {
+            Smoothness::Twice => distance.mapv_inplace(|squared| (5.0 * squared).sqrt()),
+            Smoothness::Infinite => distance *= 0.5,
+        }
+        // Of the roots, so that vector code computes the exponentials.
+        let mut decay = distance.mapv(f64::sqrt);
+        if let Some(values) = decay.as_slice_memory_order_mut() {
+            Activation::Gaussian.apply_to(values);
+        }
+        Self {
+            smoothness,
+            distance,
+            decay,
         }
     }
 
-    /// Its derivative with respect to half the squared distance.
-    fn slope(self, squared: f64) -> f64 {
-        match self {
-            Self::Twice => {
-                let r = (5.0 * squared).sqrt();
-                -5.0 / 3.0 * (1.0 + r) * (-r).exp()
-            }
-            Self::Infinite => -(-0.5 * squared).exp(),
+    fn correlations(&self) -> Array2<f64> {
+        match self.smoothness {
+            Smoothness::Twice => Zip::from(&self.distance)
+                .and(&self.decay)
+                .map_collect(|r, decay| (1.0 + r + r * r / 3.0) * decay),
+            Smoothness::Infinite => self.decay.clone(),
+        }
+    }
+
+    /// Multiplies `w` by the derivatives of the correlations with respect to half the squared distances.
+    fn scale_by_slopes(&self, w: &mut Array2<f64>) {
+        match self.smoothness {
+            Smoothness::Twice => Zip::from(w)
+                .and(&self.distance)
+                .and(&self.decay)
+                .for_each(|w, r, decay| *w *= -5.0 / 3.0 * (1.0 + r) * decay),
+            Smoothness::Infinite => *w *= &-&self.decay,
         }
     }
 }
@@ -98,11 +125,15 @@ pub(super) struct Rows {
 
 /// Squared distances of the rows of `a` and those of `b`.
 fn squared_distances(a: &Array2<f64>, b: &Array2<f64>) -> Array2<f64> {
-    let squares = |x: &Array2<f64>| (x * x).sum_axis(Axis(1));
-    let mut out = -2.0 * a.dot(&b.t());
-    out += &squares(a).insert_axis(Axis(1));
-    out += &squares(b).insert_axis(Axis(0));
-    out.mapv_into(|squared| squared.max(0.0))
+    let squares = |x: &Array2<f64>| x.map_axis(Axis(1), |row| row.dot(&row));
+    let (of_a, of_b) = (squares(a), squares(b));
+    let mut out = a.dot(&b.t());
+    for (mut row, a) in out.rows_mut().into_iter().zip(&of_a) {
+        row.zip_mut_with(&of_b, |product, b| {
+            *product = (a + b - 2.0 * *product).max(0.0);
+        });
+    }
+    out
 }
 
 /// How unlikely the scales are a priori.
@@ -122,12 +153,12 @@ struct Inverse {
 impl Inverse {
     /// `None` where rounding has made the covariance indefinite.
     fn of(mut covariance: Array2<f64>, noise: f64, spread: &Array1<f64>) -> Result<Option<Self>> {
-        let n = covariance.nrows();
         covariance.diag_mut().scaled_add(noise, spread);
-        let Ok(factor) = Cholesky::new(covariance) else {
+        // By columns, which it is as well as by rows, for it is symmetric.
+        let Ok(factor) = Cholesky::new(covariance.reversed_axes()) else {
             return Ok(None);
         };
-        let mut p = factor.solve(&Array2::eye(n))?;
+        let mut p = factor.inverse()?;
         let sums = p.sum_axis(Axis(0));
         let total = sums.sum();
         if !(total > 0.0 && total.is_finite()) {
@@ -165,15 +196,20 @@ impl Rows {
         -0.5 * fit - improbability(scales)
     }
 
-    /// The evidence of a setting.
+    /// The correlations of the rows.
+    fn correlations(&self, smoothness: Smoothness, scales: &Array1<f64>) -> Array2<f64> {
+        let z = &self.x * scales;
+        Decay::between(smoothness, &z, &z).correlations()
+    }
+
+    /// The evidence of scales, of which the rows have these correlations, and of a noise.
     fn evidence(
         &self,
-        smoothness: Smoothness,
         scales: &Array1<f64>,
+        correlations: &Array2<f64>,
         noise: f64,
     ) -> Result<Option<f64>> {
-        let z = &self.x * scales;
-        let mut covariance = squared_distances(&z, &z).mapv_into(|d| smoothness.correlation(d));
+        let mut covariance = correlations.t().to_owned();
         covariance.diag_mut().scaled_add(noise, &self.spread);
         let Ok(factor) = Cholesky::new(covariance) else {
             return Ok(None);
@@ -197,9 +233,8 @@ impl Rows {
         noise: f64,
     ) -> Result<Option<(f64, Array1<f64>)>> {
         let z = &self.x * scales;
-        let squared = squared_distances(&z, &z);
-        let covariance = squared.mapv(|d| smoothness.correlation(d));
-        let Some(inverse) = Inverse::of(covariance, noise, &self.spread)? else {
+        let decay = Decay::between(smoothness, &z, &z);
+        let Some(inverse) = Inverse::of(decay.correlations(), noise, &self.spread)? else {
             return Ok(None);
         };
         let (n, channels) = self.targets.dim();
@@ -220,9 +255,7 @@ impl Rows {
         let mut slopes = Array1::zeros(scales.len() + 1);
         slopes[scales.len()] = noise * w.diag().dot(&self.spread);
         // The squared distance along one input is u^2 + v^2 - 2 u v.
-        Zip::from(&mut w)
-            .and(&squared)
-            .for_each(|w, &squared| *w *= smoothness.slope(squared));
+        decay.scale_by_slopes(&mut w);
         let sums = w.sum_axis(Axis(1));
         let products = w.dot(&z);
         for (input, slope) in slopes.iter_mut().take(scales.len()).enumerate() {
@@ -244,13 +277,14 @@ impl Rows {
             evidence: f64::NEG_INFINITY,
         };
         for scales in spread(STARTS, inputs, FIRST_SCALES).rows() {
+            let scales = scales.to_owned();
+            let correlations = self.correlations(smoothness, &scales);
             for noise in FIRST_NOISES {
-                let scales = scales.to_owned();
-                let found = self.evidence(smoothness, &scales, noise)?;
+                let found = self.evidence(&scales, &correlations, noise)?;
                 if let Some(evidence) = found.filter(|&evidence| evidence > best.evidence) {
                     best = Setting {
                         smoothness,
-                        scales,
+                        scales: scales.clone(),
                         noise,
                         evidence,
                     };
@@ -315,7 +349,8 @@ impl Rows {
     /// The setting with the largest noise whose evidence is as good: where noise is as large as values
     /// are, the difference between a slope and none is often luck.
     pub(super) fn calmest(&self, setting: &Setting) -> Result<Setting> {
-        let of = |noise: f64| self.evidence(setting.smoothness, &setting.scales, noise);
+        let correlations = self.correlations(setting.smoothness, &setting.scales);
+        let of = |noise: f64| self.evidence(&setting.scales, &correlations, noise);
         let mut calmest = setting.clone();
         let mut most = of(setting.noise)?.unwrap_or(f64::NEG_INFINITY);
         let mut noise = setting.noise;
@@ -351,7 +386,7 @@ impl Limit {
     pub(super) fn new(rows: &Rows, setting: &Setting, folds: &[Vec<usize>]) -> Result<Self> {
         let smoothness = setting.smoothness;
         let z = &rows.x * &setting.scales;
-        let correlations = squared_distances(&z, &z).mapv_into(|d| smoothness.correlation(d));
+        let correlations = Decay::between(smoothness, &z, &z).correlations();
         let inverse = Inverse::of(correlations.clone(), setting.noise, &rows.spread)?;
         let mut limit = Self {
             smoothness,
@@ -418,8 +453,7 @@ impl Limit {
 
     /// Predictions at standardised inputs, with all rows and without each fold.
     pub(super) fn predict(&self, x: &Array2<f64>) -> (Array2<f64>, Vec<Array2<f64>>) {
-        let distances = squared_distances(&(x * &self.scales), &self.z);
-        let k = distances.mapv_into(|d| self.smoothness.correlation(d));
+        let k = Decay::between(self.smoothness, &(x * &self.scales), &self.z).correlations();
         let of = |(alpha, constant): &Weights| k.dot(alpha) + constant;
         (of(&self.all), self.without.iter().map(of).collect())
     }
@@ -449,7 +483,8 @@ mod tests {
             let at = |moved: usize, by: f64| {
                 let factor = |k: usize| if k == moved { by.exp() } else { 1.0 };
                 let scales = array![scales[0] * factor(0), scales[1] * factor(1)];
-                let found = rows.evidence(smoothness, &scales, noise * factor(2));
+                let correlations = rows.correlations(smoothness, &scales);
+                let found = rows.evidence(&scales, &correlations, noise * factor(2));
                 found.unwrap().unwrap()
             };
             let (evidence, slopes) = rows.slopes(smoothness, &scales, noise).unwrap().unwrap();

@@ -25,9 +25,13 @@ use elm_datasets::geometry::DirectionPair;
 /// Most neurons, unless they are asked for, and how many are drawn for each that is kept.
 const NEURONS: usize = 213;
 const DRAWN: usize = 2;
+/// Rows that a beginning of the search is chosen by.
+const START: usize = 60;
 /// Rows and rounds of the search: for every set of inputs, and for those that look best.
 const FIRST: (usize, usize) = (120, 15);
 const SECOND: (usize, usize) = (240, 14);
+/// The same for all sets where the targets have changed a little.
+const AGAIN: (usize, usize) = (FIRST.0, 8);
 /// Sets whose evidence is lower than the best by no more than this for each value look as good.
 const CLOSE: f64 = 0.3;
 /// Inputs that turn with the surface must have an evidence higher by this for each value: a grain is plain to
@@ -73,17 +77,9 @@ impl<'a> Search<'a> {
         let mut rows = evenly(&drawn, &targets);
         rows.truncate(LIMIT_ROWS);
         let targets = targets.select(Axis(0), &rows);
-        let weights = row_weights(tuned.metric, pairs, values, transform);
-        let spread = weights.map_or_else(
-            || Array1::ones(rows.len()),
-            |weights| {
-                let weights = weights.select(Axis(0), &rows);
-                let mean = weights.mean().unwrap_or(1.0);
-                weights.mapv(|weight| mean / weight.max(1e-6 * mean))
-            },
-        );
+        let spread = spread(tuned, pairs, values, transform, &rows);
         let sets = tuned.sets(&Tuned::FEW_SETS, grain);
-        let mut found: Vec<Found> = sets
+        let found: Vec<Found> = sets
             .into_iter()
             .map(|features| {
                 let x = features.compute_training(pairs);
@@ -96,25 +92,58 @@ impl<'a> Search<'a> {
                 Found::first(features, scaler, rows)
             })
             .collect::<Result<_>>()?;
-        let values_of = |rows: usize| (targets.nrows().min(rows) * targets.ncols()) as f64;
-        let few = values_of(FIRST.0);
-        sort(&mut found, few);
-        let least = found[0].rank(few) - CLOSE * few;
-        let (mut close, others): (Vec<_>, Vec<_>) = found
-            .into_iter()
-            .partition(|found| found.rank(few) >= least);
-        for found in &mut close {
-            found.improve(SECOND)?;
-        }
-        sort(&mut close, values_of(SECOND.0));
-        close.extend(others);
-        Ok(Self {
+        let mut search = Self {
             tuned,
             values: values.select(Axis(0), &rows),
             rows,
-            found: close,
+            found,
             total: pairs.len(),
-        })
+        };
+        search.sort();
+        Ok(search)
+    }
+
+    /// Takes the targets of another transform, which are nearly those of before.
+    pub(super) fn retarget(
+        &mut self,
+        pairs: &[DirectionPair],
+        values: ArrayView2<'_, f64>,
+        transform: &FittedTransform,
+    ) -> Result<()> {
+        let targets = transform.to_targets(self.values.view())?;
+        let spread = spread(self.tuned, pairs, values, transform, &self.rows);
+        for found in &mut self.found {
+            found.rows.targets.clone_from(&targets);
+            found.rows.spread.clone_from(&spread);
+            found.improve(AGAIN)?;
+        }
+        self.sort();
+        Ok(())
+    }
+
+    /// The values that the evidence of at most this many rows is about.
+    fn values_of(&self, most: usize) -> f64 {
+        let (rows, outputs) = self.values.dim();
+        (rows.min(most) * outputs) as f64
+    }
+
+    /// The best first, by the evidence of few rows.
+    fn sort(&mut self) {
+        let few = self.values_of(FIRST.0);
+        sort(&mut self.found, few);
+    }
+
+    /// Improves the sets that look best, on more rows.
+    pub(super) fn refine(&mut self) -> Result<()> {
+        let (few, more) = (self.values_of(FIRST.0), self.values_of(SECOND.0));
+        let least = self.found[0].rank(few) - CLOSE * few;
+        let close = self.found.partition_point(|found| found.rank(few) >= least);
+        let close = &mut self.found[..close];
+        for found in close.iter_mut() {
+            found.improve(SECOND)?;
+        }
+        sort(close, more);
+        Ok(())
     }
 
     /// Whether the best set's inputs turn with the surface.
@@ -263,10 +292,10 @@ impl<'a> Search<'a> {
 impl Found {
     /// The best setting that few rows tell.
     fn first(features: Features, scaler: Scaler<f64>, rows: Rows) -> Result<Self> {
-        let some = first_of(&rows, FIRST.0);
+        let (fewer, some) = (first_of(&rows, START), first_of(&rows, FIRST.0));
         let mut settings = Vec::with_capacity(Smoothness::ALL.len());
         for smoothness in Smoothness::ALL {
-            settings.push(some.improved(&some.start(smoothness)?, FIRST.1)?);
+            settings.push(some.improved(&fewer.start(smoothness)?, FIRST.1)?);
         }
         settings.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
         Ok(Self {
@@ -306,6 +335,26 @@ impl Teacher for Large<'_> {
         let project = |targets| self.transform.project(targets);
         (project(all), without.into_iter().map(project).collect())
     }
+}
+
+/// How many times as large as that of the others the variance of each row's noise is: where it weighs little,
+/// large.
+fn spread(
+    tuned: &Tuned,
+    pairs: &[DirectionPair],
+    values: ArrayView2<'_, f64>,
+    transform: &FittedTransform,
+    rows: &[usize],
+) -> Array1<f64> {
+    let weights = row_weights(tuned.metric, pairs, values, transform);
+    weights.map_or_else(
+        || Array1::ones(rows.len()),
+        |weights| {
+            let weights = weights.select(Axis(0), rows);
+            let mean = weights.mean().unwrap_or(1.0);
+            weights.mapv(|weight| mean / weight.max(1e-6 * mean))
+        },
+    )
 }
 
 fn first_of(rows: &Rows, count: usize) -> Rows {
