@@ -66,7 +66,7 @@ impl<A: Scalar> Cholesky<A> {
     ///
     /// let a = array![[4.0_f64, 2.0], [2.0, 3.0]];
     /// let inverse = Cholesky::new(a.clone())?.inverse()?;
-    /// assert!((a.dot(&inverse) - Array2::eye(2)).iter().all(|v| v.abs() < 1e-14));
+    /// assert!((a.dot(&inverse) - Array2::<f64>::eye(2)).iter().all(|v| v.abs() < 1e-14));
     /// # Ok::<(), elm::Error>(())
     /// ```
     ///
