@@ -63,7 +63,7 @@ pub mod cross_validation;
 mod dataset;
 mod error;
 mod feature_map;
-#[cfg(debug_assertions)]
+#[cfg(shares_generics)]
 #[doc(hidden)]
 pub mod instances;
 mod linalg;
