@@ -29,6 +29,8 @@ pub(crate) fn console(chromium: &Path, page: &Path, suffix: &str, last: &str) ->
             "--disable-sync",
         ])
         .arg(format!("--user-data-dir={}", profile.path().display()))
+        // It is killed, and leaves its sockets.
+        .env("TMPDIR", profile.path())
         .arg(format!("file://{}{suffix}", page.display()))
         .stdin(Stdio::null())
         .stdout(Stdio::null())

@@ -22,6 +22,8 @@ impl Running {
         let mut child = Command::new(env!("CARGO_BIN_EXE_elm"))
             .args(arguments)
             .current_dir(folder)
+            // What a killed executor leaves goes with the folder.
+            .env("TMPDIR", folder)
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
