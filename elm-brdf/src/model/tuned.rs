@@ -5,6 +5,7 @@ mod anchors;
 mod anisotropy;
 mod censored;
 mod compact;
+mod covariance;
 mod distill;
 mod errors;
 mod finish;

@@ -8,10 +8,11 @@ use ndarray::{Array1, Array2, ArrayView2, Axis};
 use rand::seq::index;
 
 use super::censored::Censored;
+use super::covariance::Smoothness;
 use super::distill::Teacher;
 use super::errors::{dark_noise, row_weights};
 use super::finish::Finished;
-use super::limit::{Limit, Rows, Setting, Smoothness};
+use super::limit::{Limit, Rows, Setting};
 use super::outputs::Judge;
 use super::problem::Problem;
 use super::{Drawn, Tuned, Width, better};
