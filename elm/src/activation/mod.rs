@@ -184,8 +184,8 @@ impl<A: Scalar> Activation<A> {
         }
     }
 
-    /// Applies the function to every entry.
-    pub(crate) fn apply_in_place(&self, mut z: ArrayViewMut2<'_, A>) {
+    /// Applies the function to every entry, as [`apply_to`](Self::apply_to) where they lie without gaps.
+    pub fn apply_in_place(&self, mut z: ArrayViewMut2<'_, A>) {
         let level = Level::best();
         if let Some(values) = z.as_slice_memory_order_mut() {
             return self.apply_to_slice(level, Accuracy::Full, values);

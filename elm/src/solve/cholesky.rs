@@ -71,7 +71,7 @@ impl<A: Scalar> Cholesky<A> {
     /// ```
     ///
     /// # Errors
-    /// [`Error::NotPositiveDefinite`] where a pivot is nothing.
+    /// [`Error::NotPositiveDefinite`] where a pivot is zero.
     pub fn inverse(&self) -> Result<Array2<A>> {
         let mut inverse = A::inverse_of_positive(&self.lower)?;
         for row in 0..inverse.nrows() {

@@ -42,10 +42,7 @@ impl Decay {
         }
         // Of the roots, so that vector code computes the exponentials.
         let mut decay = distance.mapv(f64::sqrt);
-        match decay.as_slice_memory_order_mut() {
-            Some(values) => Activation::Gaussian.apply_to(values),
-            None => decay.mapv_inplace(|root| Activation::Gaussian.apply(root)),
-        }
+        Activation::Gaussian.apply_in_place(decay.view_mut());
         Self {
             smoothness,
             distance,

@@ -78,7 +78,7 @@ impl<'a> Search<'a> {
         let mut rows = evenly(&drawn, &targets);
         rows.truncate(LIMIT_ROWS);
         let targets = targets.select(Axis(0), &rows);
-        let spread = spread(tuned, pairs, values, transform, &rows);
+        let spread = row_spread(tuned, pairs, values, transform, &rows);
         let sets = tuned.sets(&Tuned::FEW_SETS, grain);
         let found: Vec<Found> = sets
             .into_iter()
@@ -112,7 +112,7 @@ impl<'a> Search<'a> {
         transform: &FittedTransform,
     ) -> Result<()> {
         let targets = transform.to_targets(self.values.view())?;
-        let spread = spread(self.tuned, pairs, values, transform, &self.rows);
+        let spread = row_spread(self.tuned, pairs, values, transform, &self.rows);
         for found in &mut self.found {
             found.rows.targets.clone_from(&targets);
             found.rows.spread.clone_from(&spread);
@@ -340,7 +340,7 @@ impl Teacher for Large<'_> {
 
 /// How many times as large as that of the others the variance of each row's noise is: where it weighs little,
 /// large.
-fn spread(
+fn row_spread(
     tuned: &Tuned,
     pairs: &[DirectionPair],
     values: ArrayView2<'_, f64>,
