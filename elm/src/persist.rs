@@ -174,7 +174,7 @@ impl<A: Scalar, D: TargetDim> Persist for Elm<A, D> {
 impl<A: Scalar, D: TargetDim> Persist for Accumulator<A, D> {
     const KIND: &'static str = "elm accumulator";
     const SCALAR: &'static str = A::NAME;
-    const VERSION: u32 = 5;
+    const VERSION: u32 = 6;
 
     fn check(&self) -> Result<(), Error> {
         not_custom(self.hidden())

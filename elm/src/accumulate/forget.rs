@@ -8,13 +8,13 @@ use crate::scalar::Scalar;
 impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
     /// Lets all rows so far count less: their weights are multiplied by `factor`, from 0 (all are forgotten)
     /// to 1 (none is). Called before every push, rows that came `k` pushes ago weigh `factor` to the power of
-    /// `k`, so that the fit follows what drifts. Costs a pass over the triangle.
+    /// `k`, so that the fit follows what drifts. Costs a pass over what is kept.
     ///
     /// The number of rows that generalized cross-validation divides by shrinks alike, to about
     /// `rows / (1 - factor)` for pushes of `rows` rows. [`rows`](Self::rows), the random layer, the scaler
     /// and the bounds of predictions remain those of all rows.
     ///
-    /// There is no window that takes old rows off again: what is subtracted from a triangle leaves its
+    /// There is no window that takes old rows off again: what is subtracted leaves its
     /// rounding errors behind, which grow with the condition squared (Golub and Van Loan, Matrix
     /// Computations, 2013, section 6.5).
     ///
@@ -48,7 +48,11 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
             });
         }
         let root = A::from_f64(factor.sqrt());
-        self.triangle *= root;
+        if self.keeps_products() {
+            self.kept *= A::from_f64(factor);
+        } else {
+            self.kept *= root;
+        }
         self.pending.iter_mut().for_each(|value| *value *= root);
         self.drop_weightless_rows();
         let shrunk = |rows: u64| rows as f64 * factor;

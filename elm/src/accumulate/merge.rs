@@ -6,8 +6,8 @@ use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 
 impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
-    /// Takes in all that `other` has taken in: as rows where it has not factorized any yet, which costs no
-    /// factorization here either, else its triangle.
+    /// Takes in all that `other` has taken in: as rows where none has entered its triangle or sums yet, which
+    /// costs no factorization here either, else these.
     ///
     /// # Errors
     /// [`Error::Mismatch`] naming what differs: the random layer, the scaler, the outputs, or the
@@ -39,13 +39,17 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
     /// As [`merge`](Self::merge), of one with the same layer and settings; after an error half done.
     pub(super) fn merge_alike(&mut self, other: &Self) -> Result<()> {
         self.widen_bounds(other.bounds.clone());
-        if other.has_triangle() {
+        if other.has_kept() {
             let mut other = other.clone();
             self.flush()?;
             other.flush()?;
-            let mut rows = &other.triangle * &other.scales;
-            self.take_over(&other, rows.view_mut());
-            self.absorb(&rows)?;
+            if self.keeps_products() {
+                self.add_products(&other.kept, &other.scales, other.shift.as_ref())?;
+            } else {
+                let mut rows = &other.kept * &other.scales;
+                self.take_over(&other, rows.view_mut());
+                self.absorb(&rows)?;
+            }
         } else {
             self.take_pending(&other.pending)?;
         }
@@ -57,12 +61,12 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
         Ok(())
     }
 
-    /// Whether rows have entered the triangle.
-    fn has_triangle(&self) -> bool {
-        self.triangle.iter().any(|value| *value != A::zero())
+    /// Whether rows have entered what is kept.
+    fn has_kept(&self) -> bool {
+        self.kept.iter().any(|value| *value != A::zero())
     }
 
-    /// Takes in rows that another has not factorized either.
+    /// Takes in rows that have not entered another's either.
     fn take_pending(&mut self, rows: &[A]) -> Result<()> {
         let block = self.block() * self.columns();
         for row in rows.chunks_exact(self.columns()) {
@@ -74,15 +78,15 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
         Ok(())
     }
 
-    /// Lets all rows enter the triangle, of which a file then holds little more: half the square of neurons
-    /// and outputs in numbers, where rows that wait to be factorized together are several times as many.
-    /// Costs a factorization. Rows that are fewer numbers than the triangle stay as they are.
+    /// Lets all rows enter the triangle or the sums, of which a file then holds little more: half the square of
+    /// neurons and outputs in numbers, where rows that wait to enter together are several times as many.
+    /// Costs a factorization where a triangle is kept. Rows that are fewer numbers than it stay as they are.
     ///
     /// # Errors
     /// [`Error::Overflow`] for values beyond the range; nothing has changed then.
     pub fn compact(&mut self) -> Result<()> {
         let triangle = self.columns() * (self.columns() + 1) / 2;
-        if self.pending.len() < triangle && !self.has_triangle() {
+        if self.pending.len() < triangle && !self.has_kept() {
             return Ok(());
         }
         let mut next = self.clone();

@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 use ndarray::{Array1, Array2, Axis};
 use serde::Deserialize;
 
-use super::{Accumulator, BLOCK, OVERFLOW};
+use super::{Accumulator, OVERFLOW, block};
 use crate::bounds::Bounds;
 use crate::check::{check_length, check_matrix};
 use crate::dataset::{TargetDim, check_outputs};
@@ -28,7 +28,7 @@ pub(super) struct Parts<A: Scalar> {
     far: Vec<u64>,
     unlike_rows: bool,
     #[serde(with = "super::upper")]
-    triangle: Array2<A>,
+    kept: Array2<A>,
     scales: Array1<A>,
     shift: Option<Array1<A>>,
     pending: Vec<A>,
@@ -46,12 +46,12 @@ impl<A: Scalar, D: TargetDim> TryFrom<Parts<A>> for Accumulator<A, D> {
         if let Some(bounds) = &parts.bounds {
             bounds.check(parts.inputs, parts.outputs)?;
         }
-        check_matrix("triangle", parts.triangle.view())?;
+        check_matrix("kept", parts.kept.view())?;
         let own = usize::from(parts.intercept) + parts.map.features();
-        let columns = parts.triangle.ncols();
+        let columns = parts.kept.ncols();
         // Subtracted, as the sum might overflow.
         check_length("outputs", columns.saturating_sub(own), parts.outputs)?;
-        check_length("rows of the triangle", parts.triangle.nrows(), columns)?;
+        check_length("rows of what is kept", parts.kept.nrows(), columns)?;
         check_length("scales", parts.scales.len(), columns)?;
         check_length("counts of inputs", parts.far.len(), parts.inputs)?;
         if parts.weighted_rows > parts.rows {
@@ -61,7 +61,8 @@ impl<A: Scalar, D: TargetDim> TryFrom<Parts<A>> for Accumulator<A, D> {
                 found: usize::try_from(parts.weighted_rows).unwrap_or(usize::MAX),
             });
         }
-        if parts.outputs == 0 || parts.pending.len() >= BLOCK * columns * columns {
+        if parts.outputs == 0 || parts.pending.len() >= block::<A>(parts.solver, columns) * columns
+        {
             return Err(Error::Shape {
                 what: "pending rows",
                 expected: 0,
@@ -87,7 +88,7 @@ impl<A: Scalar, D: TargetDim> TryFrom<Parts<A>> for Accumulator<A, D> {
             weighted_rows,
             far,
             unlike_rows,
-            triangle,
+            kept,
             scales,
             shift,
             pending,
@@ -104,7 +105,7 @@ impl<A: Scalar, D: TargetDim> TryFrom<Parts<A>> for Accumulator<A, D> {
             weighted_rows,
             far,
             unlike_rows,
-            triangle,
+            kept,
             scales,
             shift,
             pending,

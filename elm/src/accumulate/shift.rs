@@ -1,4 +1,4 @@
-//! The constants that are subtracted from columns before they enter the triangle.
+//! The constants that are subtracted from columns before they enter what is kept.
 //!
 //! Centering a column by the column of ones costs as many digits as its mean has over its deviation.
 //! Columns are therefore taken less a value near their mean, which is known from the first rows. What
@@ -47,7 +47,7 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
 
 /// The weighted mean of each column but the first, of the roots of the weights; of a constant its
 /// value to within a rounding or two.
-fn near_means<A: Scalar>(rows: &ArrayRef2<A>) -> Array1<A> {
+pub(super) fn near_means<A: Scalar>(rows: &ArrayRef2<A>) -> Array1<A> {
     // In shares of their sum, so that no sum leaves the range.
     let roots = A::widen(rows.column(0));
     let total = stats::sum(roots.iter().copied());

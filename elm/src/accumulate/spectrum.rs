@@ -1,4 +1,4 @@
-//! Converts an accumulator's triangle into the problem that a batch fit would have prepared.
+//! Converts what an accumulator keeps into the problem that a batch fit would have prepared.
 
 use std::ops::Range;
 
@@ -15,11 +15,11 @@ use crate::solve::equilibration::Equilibration;
 impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
     /// The problem in the coordinates of its singular vectors, as a batch fit has it.
     pub(super) fn spectrum(&self) -> Result<DesignSvd<A>> {
-        let extra = usize::from(self.intercept);
-        let neurons = self.columns() - self.outputs - extra;
-        let (hidden, targets) = (extra..extra + neurons, extra + neurons..self.columns());
-        let rows = usize::try_from(self.rows).unwrap_or(usize::MAX);
-
+        if self.keeps_products() {
+            return self.moments()?.spectrum();
+        }
+        let (hidden, targets) = self.places();
+        let neurons = hidden.len();
         // Neurons share one scale, so that the singular values are those of the whole matrix.
         let scales = self.scales.slice(s![hidden.clone()]);
         let mut hidden_scale = scales
@@ -27,7 +27,7 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
             .fold(A::min_positive_value(), |m, s| m.max(*s));
         let block = |rows: &Range<usize>, columns: &Range<usize>| {
             let block = s![rows.clone(), columns.clone()];
-            self.triangle.slice(block).to_owned()
+            self.kept.slice(block).to_owned()
         };
         let mut h = block(&hidden, &hidden);
         h *= &(&scales / hidden_scale);
@@ -67,21 +67,17 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
         }
         // The column of ones is as long as the root of the weights' sum.
         let total_weight = if self.intercept {
-            (self.triangle[[0, 0]] * self.scales[0]).powi(2)
+            (self.kept[[0, 0]] * self.scales[0]).powi(2)
         } else {
             A::one()
         };
         let frame = Equilibration {
-            rows,
-            weighted_rows: usize::try_from(self.weighted_rows).unwrap_or(usize::MAX),
-            intercept: self.intercept,
-            root_weights: Array1::zeros(0),
-            weight_scale: A::one(),
             total_weight,
             hidden_mean,
             target_mean,
             hidden_scale,
             target_scale,
+            ..self.frame()
         };
         let triangle = QrFactor {
             r: h,
@@ -91,21 +87,44 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
         DesignSvd::of_triangle(triangle, frame)
     }
 
+    /// The columns of neurons and of outputs.
+    pub(super) fn places(&self) -> (Range<usize>, Range<usize>) {
+        let first = usize::from(self.intercept);
+        let end = self.columns() - self.outputs;
+        (first..end, end..self.columns())
+    }
+
+    /// What the numbers of rows say; of means and scales there are none yet.
+    pub(super) fn frame(&self) -> Equilibration<A> {
+        Equilibration {
+            rows: usize::try_from(self.rows).unwrap_or(usize::MAX),
+            weighted_rows: usize::try_from(self.weighted_rows).unwrap_or(usize::MAX),
+            intercept: self.intercept,
+            root_weights: Array1::zeros(0),
+            weight_scale: A::one(),
+            total_weight: A::one(),
+            hidden_mean: Array1::zeros(self.columns() - self.outputs - usize::from(self.intercept)),
+            target_mean: Array1::zeros(self.outputs),
+            hidden_scale: A::one(),
+            target_scale: Array1::ones(self.outputs),
+        }
+    }
+
     /// From an entry of the triangle's column, over the first row's diagonal, to a value of that column.
     fn unscaled(&self, column: usize) -> A {
-        self.scales[column] / self.scales[0] / self.triangle[[0, 0]]
+        self.scales[column] / self.scales[0] / self.kept[[0, 0]]
     }
 
     /// The mean of a column; for sums with an intercept.
     fn mean(&self, column: usize) -> A {
         let shift = self.shift.as_ref().map_or(A::zero(), |s| s[column - 1]);
-        shift + self.triangle[[0, column]] * self.unscaled(column)
+        shift + self.kept[[0, column]] * self.unscaled(column)
     }
 
     /// Whether a column is a constant. What centering leaves of one is the rounding of its values, and would
     /// pass for a feature; it does not grow with the rows.
     fn is_constant(&self, column: usize) -> bool {
-        let left = self.triangle.slice(s![1..=column, column]);
+        let left = self.kept.slice(s![1..=column, column]);
         let deviation = left.dot(&left).sqrt() * self.unscaled(column).abs();
         deviation <= A::from_f64(4.0) * A::epsilon() * self.mean(column).abs()
     }

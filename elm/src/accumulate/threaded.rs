@@ -18,9 +18,9 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
         t: ArrayView2<'_, A>,
         weights: Option<ArrayView1<'_, A>>,
     ) -> Result<()> {
-        /// Blocks of a part: putting its triangle under another costs less than half a block.
+        /// Blocks of a part: merging it costs less than half a block.
         const BLOCKS: usize = 4;
-        /// Numbers in the blocks and triangles of all parts.
+        /// Numbers in what all parts keep.
         const ROOM: usize = 1 << 25;
         let square = self.columns().saturating_mul(self.columns());
         let most = (ROOM / square.saturating_mul(BLOCK + 2).max(1)).min(16);
@@ -66,7 +66,7 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
             rows: 0,
             weighted_rows: 0,
             far: vec![0; self.inputs],
-            triangle: Array2::zeros(self.triangle.dim()),
+            kept: Array2::zeros(self.kept.dim()),
             scales: Array1::ones(self.columns()),
             shift: None,
             pending: Vec::new(),

@@ -1,4 +1,4 @@
-//! An upper triangle in files: its rows from the diagonal on, one after the other.
+//! The upper half of a square in files: its rows from the diagonal on, one after the other.
 
 use ndarray::Array2;
 use serde::de::Error as _;

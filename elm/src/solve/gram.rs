@@ -135,6 +135,19 @@ pub(super) fn solve_rows<A: Scalar>(
         return Ok(None);
     }
     let moments = NormalEquations::gather(source)?;
+    solve_moments(&moments, lambda, Some(source))
+}
+
+/// The same from sums of products. Residuals that are small differences of these are taken from the rows,
+/// where they are still there.
+///
+/// # Errors
+/// Those of making the rows.
+pub(crate) fn solve_moments<A: Scalar>(
+    moments: &NormalEquations<A>,
+    lambda: f64,
+    source: Option<&RowSource<'_, A>>,
+) -> Result<Option<Solution<A>>> {
     if !moments.in_range() {
         return Ok(None);
     }
@@ -160,10 +173,13 @@ pub(super) fn solve_rows<A: Scalar>(
     let trusted = A::from_f64(100.0) * A::epsilon().sqrt();
     let small = |(&square, &whole): (&A, &A)| square < trusted * whole || whole == A::zero();
     if squares.iter().zip(&moments.squares).any(small) {
-        squares = moments.residual_squares(source, &x)?;
+        match source {
+            Some(source) => squares = moments.residual_squares(source, &x)?,
+            None => squares.mapv_inplace(|square| square.max(A::zero())),
+        }
     }
     let norms = squares.iter().map(|s| s.as_f64().sqrt());
-    let kept = source.neurons() as f64 - (absolute * inverse_trace).as_f64();
+    let kept = moments.gram.ncols() as f64 - (absolute * inverse_trace).as_f64();
     let found = Found {
         beta: x,
         route: Route::Gram,

@@ -62,7 +62,7 @@ use crate::error::{Error, Result};
 use crate::linalg::Failure;
 use crate::scalar::Scalar;
 use design_svd::DesignSvd;
-use normal_equations::{HiddenRows, RowSource};
+use normal_equations::{HiddenRows, NormalEquations, RowSource};
 
 pub use cholesky::Cholesky;
 pub use diagnosis::{Diagnosis, Reason, Route};
@@ -320,6 +320,26 @@ impl Solver {
             Self::PseudoInverse(solver) => solver.solve_spectrum(spectrum),
             Self::Ridge(solver) => solver.solve_spectrum(spectrum),
         })
+    }
+
+    /// Solves a problem that is known only by its sums of products, or nothing where these do not serve.
+    pub(crate) fn solve_moments<A: Scalar>(
+        &self,
+        moments: &NormalEquations<A>,
+    ) -> Result<Option<Solution<A>>> {
+        let Some(lambda) = self.strength_for_products::<A>() else {
+            return Ok(None);
+        };
+        let solution = gram::solve_moments(moments, lambda, None)?;
+        solution.map(in_range).transpose()
+    }
+
+    /// The given strength of ridge, where it leaves sums of products their digits.
+    pub(crate) fn strength_for_products<A: Scalar>(&self) -> Option<f64> {
+        match self {
+            Self::Ridge(ridge) => ridge.strength_for_products::<A>(),
+            Self::Inverse(_) | Self::PseudoInverse(_) => None,
+        }
     }
 
     /// The same, but choosing by generalized cross-validation where leave-one-out was to choose.

@@ -306,6 +306,23 @@ impl<A: Scalar> NormalEquations<A> {
         }
     }
 
+    /// Of columns that are centered already, where there is an intercept.
+    pub(crate) fn of_centered(
+        gram: Array2<A>,
+        right: Array2<A>,
+        squares: Array1<A>,
+        frame: Equilibration<A>,
+    ) -> Self {
+        Self {
+            gram,
+            right,
+            squares,
+            correction: A::zero(),
+            frame,
+            shift: Vec::new(),
+        }
+    }
+
     /// Whether the sums are those of numbers in the middle of the type's range.
     pub(crate) fn in_range(&self) -> bool {
         let bound = A::max_value().sqrt();

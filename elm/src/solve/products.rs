@@ -7,7 +7,7 @@ use super::Route;
 use super::design_svd::DesignSvd;
 use super::gram::{self, Sums};
 use super::normal_equations::NormalEquations;
-use super::tiles::{MIN_SAMPLE, Tiles, squares};
+use super::tiles::{MIN_SAMPLE, Tiles};
 use crate::error::Result;
 use crate::linalg::{Backend, Eigen};
 use crate::scalar::Scalar;
@@ -109,11 +109,11 @@ impl<A: Scalar> Tiles<'_, '_, A> {
         if sample.is_none() && !may_do(&all()) {
             return Ok(None);
         }
-        let gram = &moments.gram;
+        let all_squares = moments.squares.clone();
         let Eigen {
             values: mut s,
             mut vt,
-        } = f64::eigen(gram.view())?;
+        } = f64::eigen(moments.gram.view())?;
         let (Some(&largest), Some(&smallest)) = (s.first(), s.last()) else {
             return Ok(None);
         };
@@ -127,28 +127,64 @@ impl<A: Scalar> Tiles<'_, '_, A> {
             s = s.slice(s![..known]).to_owned();
             vt = vt.slice(s![..known, ..]).to_owned();
         }
-        let s = s.mapv_into(f64::sqrt);
-        let c = f64::product(vt.view(), moments.right.view()) / s.view().insert_axis(Axis(1));
-        let residual_ss = &moments.squares - &squares(c.view());
-        let share = residual_ss.iter().zip(&moments.squares);
+        let mut spectrum = moments.along(Eigen { values: s, vt });
+        let share = spectrum.residual_ss.iter().zip(&all_squares);
         let share = share.filter(|(_, all)| **all > 0.0);
         let share = share.fold(1.0, |least: f64, (left, all)| least.min(left / all));
         if share < gram::UNEXPLAINED {
             return Ok(None);
         }
-        let weakest = (!conditioned).then(|| gram::weakest_searched(share) * larger);
-        let frame = moments.frame;
+        spectrum.weakest = (!conditioned).then(|| gram::weakest_searched(share) * larger);
+        Ok(Some(spectrum))
+    }
+}
+
+impl<A: Scalar> NormalEquations<A> {
+    /// The problem in the coordinates of its singular vectors: none where all is 0.
+    ///
+    /// # Errors
+    /// Those of the factorization.
+    pub(crate) fn spectrum(self) -> Result<DesignSvd<A>> {
+        let Eigen { values, vt } = A::eigen(self.gram.view())?;
+        let known = if values.first().is_some_and(|largest| *largest > A::zero()) {
+            values.len()
+        } else {
+            0
+        };
+        let values = values.mapv_into(|value| value.max(A::zero()));
+        let (values, vt) = (
+            values.slice_move(s![..known]),
+            vt.slice_move(s![..known, ..]),
+        );
+        Ok(self.along(Eigen { values, vt }))
+    }
+
+    /// The problem in the coordinates of these eigenvectors of the sums of products.
+    fn along(self, Eigen { values, vt }: Eigen<A>) -> DesignSvd<A> {
+        let Self {
+            gram,
+            right,
+            squares: all,
+            frame,
+            ..
+        } = self;
+        let s = values.mapv_into(A::sqrt);
+        let mut c = A::product(vt.view(), right.view());
+        for (mut c, &s) in c.rows_mut().into_iter().zip(&s) {
+            c.mapv_inplace(|c| if s > A::zero() { c / s } else { A::zero() });
+        }
+        let explained = c.map_axis(Axis(0), |column| column.dot(&column));
         let mean = &frame.hidden_mean / frame.hidden_scale;
         let column_ss = &gram.diag() + &mean.mapv_into(|m| m * m * frame.total_weight);
-        Ok(Some(DesignSvd {
+        DesignSvd {
             route: Route::GramSvd,
             s,
             vt,
             c,
-            residual_ss,
+            residual_ss: (all - explained).mapv_into(|left| left.max(A::zero())),
             column_ss,
-            weakest,
+            weakest: None,
             frame,
-        }))
+        }
     }
 }

@@ -124,6 +124,14 @@ impl Ridge {
         self.lambda
     }
 
+    /// The given strength, where it allows the normal equations.
+    pub(super) fn strength_for_products<A: Scalar>(self) -> Option<f64> {
+        match self.lambda {
+            Lambda::Relative(lambda) => gram::allowed::<A>(lambda).then_some(lambda),
+            Lambda::Gcv | Lambda::LeaveOneOut => None,
+        }
+    }
+
     pub(crate) fn shared(self) -> bool {
         self.shared
     }
@@ -158,7 +166,7 @@ impl Ridge {
         match self.lambda {
             Lambda::Relative(lambda) => {
                 let prepared = EquilibratedProblem::new(problem);
-                if gram::allowed::<A>(lambda)
+                if self.strength_for_products::<A>().is_some()
                     && let Some(solution) = gram::solve(&prepared, lambda)
                 {
                     return Ok(solution);
@@ -188,8 +196,7 @@ impl Ridge {
         self,
         source: &RowSource<'_, A>,
     ) -> Result<Option<Solution<A>>> {
-        if let Lambda::Relative(lambda) = self.lambda
-            && gram::allowed::<A>(lambda)
+        if let Some(lambda) = self.strength_for_products::<A>()
             && let Some(solution) = gram::solve_rows(source, lambda)?
         {
             return Ok(Some(solution));

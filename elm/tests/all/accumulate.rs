@@ -1,7 +1,7 @@
 //! Rows that arrive in pieces give the answer of a batch fit.
 
 use crate::common::{amplification, frobenius, normal, weights};
-use elm::solve::{Inverse, PseudoInverse, Ridge, Solver};
+use elm::solve::{Inverse, PseudoInverse, Ridge, Route, Solver};
 use elm::{Accumulator, Biases, Dataset, Elm, ElmParams, Error, Scalar, Scaler};
 use ndarray::{Array1, Array2, Axis, array, s};
 
@@ -487,8 +487,8 @@ fn a_damaged_accumulator_is_not_read() {
             serde_json::json!({"v": 1, "dim": [7], "data": vec![0.0; 7]}),
         ),
         // Of six columns, not of seven; and no triangle.
-        ("/triangle", serde_json::json!(vec![0.0; 21])),
-        ("/triangle", serde_json::json!(vec![0.0; 27])),
+        ("/kept", serde_json::json!(vec![0.0; 21])),
+        ("/kept", serde_json::json!(vec![0.0; 27])),
         (
             "/solver",
             serde_json::json!({"ridge": {"lambda": {"relative": -1.0}, "shared": false}}),
@@ -498,10 +498,45 @@ fn a_damaged_accumulator_is_not_read() {
         *damaged.pointer_mut(field).unwrap() = value;
         assert!(!read(&damaged), "{field}: {:?}", damaged.pointer(field));
     }
-    // A triangle of zeros is well formed, and has no mean.
-    let mut empty = whole;
-    empty["triangle"] = serde_json::json!(vec![0.0; 28]);
-    empty["pending"] = serde_json::json!([]);
-    let empty: Accumulator<f64> = serde_json::from_value(empty).unwrap();
-    assert!(matches!(empty.fit(), Err(Error::Overflow { .. })));
+    // Zeros are well formed, and have no mean, be they a triangle or sums of products.
+    for lambda in [
+        serde_json::json!("gcv"),
+        serde_json::json!({"relative": 0.1}),
+    ] {
+        let mut empty = whole.clone();
+        empty["kept"] = serde_json::json!(vec![0.0; 28]);
+        empty["pending"] = serde_json::json!([]);
+        empty["solver"]["ridge"]["lambda"] = lambda;
+        let empty: Accumulator<f64> = serde_json::from_value(empty).unwrap();
+        assert!(matches!(empty.fit(), Err(Error::Overflow { .. })));
+    }
+}
+
+#[test]
+fn sums_of_products_lose_no_digits_to_means_that_move() {
+    let (mut x, _) = data::<f64>(3000, 18);
+    // In the order of an input, so that the first rows are unlike the rest.
+    let mut column = x.column(0).to_vec();
+    column.sort_by(f64::total_cmp);
+    x.column_mut(0).assign(&Array1::from(column));
+    let t = x.map_axis(Axis(1), |row| 1e6 + row[0] + (row[1] * row[2]).sin());
+    let t = t.insert_axis(Axis(1));
+    // As weak as is allowed.
+    let params = ElmParams::new(30).with_solver(Ridge::relative(3e-8));
+    let batch = params.fit(&x, &t).unwrap();
+    for chunk in [7, 500] {
+        let whole = accumulated(&params, &x, &t, chunk).fit().unwrap();
+        assert_eq!(whole.diagnosis().route, Route::Gram);
+        assert_same_fit(&whole, &batch, &x, "in order");
+        let empty = Accumulator::from_sample(&params, &x, 1).unwrap();
+        let mut parts = vec![empty.clone(), empty];
+        for (place, range) in [0..2500, 2500..3000].into_iter().enumerate() {
+            let range = s![range, ..];
+            parts[place].push(&x.slice(range), &t.slice(range)).unwrap();
+            parts[place].compact().unwrap();
+        }
+        let [mut first, second] = <[_; 2]>::try_from(parts).unwrap();
+        first.merge(&second).unwrap();
+        assert_same_fit(&first.fit().unwrap(), &batch, &x, "merged");
+    }
 }
