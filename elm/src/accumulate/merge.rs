@@ -44,7 +44,7 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
             self.flush()?;
             other.flush()?;
             if self.keeps_products() {
-                self.add_products(&other.kept, &other.scales, other.shift.as_ref())?;
+                self.add_products(&other)?;
             } else {
                 let mut rows = &other.kept * &other.scales;
                 self.take_over(&other, rows.view_mut());

@@ -34,75 +34,100 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
             }
             means = Some(found);
         }
-        let scales = largest(&rows).mapv_into(power_of_two);
-        rows /= &scales;
-        // The lower half by columns is the upper half by rows.
-        let mut products = A::gram(rows.view()).reversed_axes();
-        if self.intercept {
-            products.slice_mut(s![0, 1..]).fill(A::zero());
+        let units = largest(&rows).mapv_into(|size| match size == A::zero() {
+            true => size,
+            false => power_of_two(size),
+        });
+        self.share_units(&units);
+        rows /= &self.scales;
+        if let Some(means) = means {
+            let roots = rows.column(0);
+            self.share_means(&means, roots.dot(&roots));
         }
-        self.add_products(&products, &scales, means.as_ref())
+        // The lower half by columns is the upper half by rows.
+        let kept = std::mem::replace(&mut self.kept, Array2::zeros((0, 0)));
+        let mut sums = kept.reversed_axes();
+        A::add_gram(rows.view(), &mut sums, &mut Vec::new());
+        self.kept = sums.reversed_axes();
+        for (i, mut row) in self.kept.rows_mut().into_iter().enumerate() {
+            row.slice_mut(s![..i]).fill(A::zero());
+        }
+        if self.intercept {
+            self.kept.slice_mut(s![0, 1..]).fill(A::zero());
+        }
+        self.check_range()
     }
 
-    /// Takes in sums of products of columns that were divided by `scales`, about these means.
-    pub(super) fn add_products(
-        &mut self,
-        products: &Array2<A>,
-        scales: &Array1<A>,
-        means: Option<&Array1<A>>,
-    ) -> Result<()> {
-        // The larger unit of a column that is not 0 in both.
-        let units = |sums: &Array2<A>, scales: &Array1<A>| {
-            let used = |(&sum, &scale): (&A, &A)| if sum > A::zero() { scale } else { A::zero() };
-            sums.diag()
-                .iter()
-                .zip(scales)
-                .map(used)
-                .collect::<Array1<A>>()
-        };
-        let (ours, theirs) = (units(&self.kept, &self.scales), units(products, scales));
-        let mut common = Array1::ones(ours.len());
-        Zip::from(&mut common)
-            .and(&ours)
-            .and(&theirs)
-            .for_each(|to, &a, &b| {
-                if a.max(b) > A::zero() {
-                    *to = a.max(b);
-                }
-            });
-        let (ours, theirs) = (ours / &common, theirs / &common);
-        let mut apart = None;
-        if let (Some(means), Some(own)) = (means, &mut self.shift) {
-            let (mine, others) = (
-                self.kept[[0, 0]] * ours[0] * ours[0],
-                products[[0, 0]] * theirs[0] * theirs[0],
-            );
-            let share = others / (mine + others);
-            if mine > A::zero() && others > A::zero() {
-                let distance = means - &*own;
-                own.scaled_add(share, &distance);
-                let root = (mine * share).sqrt() * common[0];
-                apart = Some(distance * root / common.slice(s![1..]));
-            } else if others > A::zero() {
-                own.assign(means);
-            }
-        } else if let Some(means) = means {
-            self.shift = Some(means.clone());
+    /// Takes in the sums of products of another with the same layer and settings.
+    pub(super) fn add_products(&mut self, other: &Self) -> Result<()> {
+        self.share_units(&other.units());
+        let factors = other.units() / &self.scales;
+        if let Some(means) = &other.shift {
+            self.share_means(means, other.kept[[0, 0]] * factors[0] * factors[0]);
         }
         for (i, mut row) in self.kept.rows_mut().into_iter().enumerate() {
-            let columns = row.iter_mut().zip(products.row(i)).zip(&ours).zip(&theirs);
-            for (((to, &more), &mine), &others) in columns.skip(i) {
-                *to = *to * ours[i] * mine + more * theirs[i] * others;
-            }
+            Zip::from(row.slice_mut(s![i..]))
+                .and(other.kept.slice(s![i, i..]))
+                .and(factors.slice(s![i..]))
+                .for_each(|to, &more, &factor| *to += more * factor * factors[i]);
         }
-        if let Some(apart) = apart {
-            let mut centered = self.kept.slice_mut(s![1.., 1..]);
-            for (i, mut row) in centered.rows_mut().into_iter().enumerate() {
-                row.slice_mut(s![i..])
-                    .scaled_add(apart[i], &apart.slice(s![i..]));
-            }
+        self.check_range()
+    }
+
+    /// What each column was divided by; 0 for one that is 0.
+    fn units(&self) -> Array1<A> {
+        let unit = |(&sum, &scale): (&A, &A)| match sum > A::zero() {
+            true => scale,
+            false => A::zero(),
+        };
+        self.kept
+            .diag()
+            .iter()
+            .zip(&self.scales)
+            .map(unit)
+            .collect()
+    }
+
+    /// Divides columns by larger powers of two where these units are larger.
+    fn share_units(&mut self, others: &Array1<A>) {
+        let own = self.units();
+        let common: Array1<A> = own.iter().zip(others).map(|(a, b)| a.max(*b)).collect();
+        self.scales = common.mapv(|unit| if unit > A::zero() { unit } else { A::one() });
+        if own != common {
+            let factors = own / &self.scales;
+            self.kept *= &factors;
+            self.kept *= &factors.insert_axis(Axis(1));
         }
-        self.scales = common;
+    }
+
+    /// Moves the means to those of the rows so far and of others, whose means these are and whose weight is
+    /// in the units of the first column, and adds what the distance adds to the sums.
+    fn share_means(&mut self, means: &Array1<A>, weight: A) {
+        let Some(own) = &mut self.shift else {
+            self.shift = Some(means.clone());
+            return;
+        };
+        let before = self.kept[[0, 0]];
+        if weight <= A::zero() {
+            return;
+        }
+        if before <= A::zero() {
+            own.assign(means);
+            return;
+        }
+        let share = weight / (before + weight);
+        let mut apart = means - &*own;
+        own.scaled_add(share, &apart);
+        apart *= (before * share).sqrt() * self.scales[0];
+        apart /= &self.scales.slice(s![1..]);
+        let mut centered = self.kept.slice_mut(s![1.., 1..]);
+        for (i, mut row) in centered.rows_mut().into_iter().enumerate() {
+            row.slice_mut(s![i..])
+                .scaled_add(apart[i], &apart.slice(s![i..]));
+        }
+    }
+
+    fn check_range(&self) -> Result<()> {
         if self.kept.iter().all(|sum| sum.is_finite()) {
             Ok(())
         } else {
