@@ -1,4 +1,7 @@
-//! What `elm_fit` keeps of a group: its rows while they are few, then a triangle.
+//! What `elm_fit` keeps of a group: its rows while they are few, then what an accumulator keeps.
+
+use std::cmp::Ordering;
+use std::ops::Range;
 
 use elm::persist::Persist;
 use elm::{Accumulator, Dataset, Elm, ElmParams};
@@ -50,7 +53,7 @@ impl State {
     /// Whether a state from elsewhere is of these arguments.
     pub(crate) fn fits(&self, columns: usize, targets: usize) -> bool {
         let rows = match &self.held {
-            Held::Rows(values) => values.len() % columns.max(1) == 0,
+            Held::Rows(values) => values.len() as u64 == self.rows.saturating_mul(columns as u64),
             Held::Sums(_) => true,
         };
         self.columns == columns && self.ranges.len() == targets && rows
@@ -82,7 +85,10 @@ impl State {
         self.rows = self.rows.saturating_add(rows.nrows() as u64);
         if let Held::Rows(values) = &mut self.held {
             if self.rows <= settings.group_rows as u64 {
-                values.extend(rows.iter());
+                match rows.as_slice() {
+                    Some(rows) => values.extend_from_slice(rows),
+                    None => values.extend(rows.iter()),
+                }
                 return Ok(());
             }
             let values = std::mem::take(values);
@@ -101,8 +107,13 @@ impl State {
         settings: &Settings,
         sample: Option<&Sample>,
     ) -> Result<(), Failure> {
-        self.skipped = self.skipped.saturating_add(other.skipped);
+        let skipped = self.skipped.saturating_add(other.skipped);
+        self.skipped = skipped;
         match other.held {
+            Held::Rows(_) if self.rows == 0 && other.rows <= settings.group_rows as u64 => {
+                *self = Self { skipped, ..other };
+                Ok(())
+            }
             Held::Rows(values) => {
                 let rows = values.len() / self.columns.max(1);
                 let rows = ArrayView2::from_shape((rows, self.columns), &values);
@@ -172,18 +183,33 @@ impl State {
 
 fn fit_rows(rows: ArrayView2<'_, f64>, settings: &Settings) -> Result<Elm<f64>, Failure> {
     // The same bits in whatever order the rows have come.
-    let mut order: Vec<usize> = (0..rows.nrows()).collect();
-    order.sort_unstable_by(|&one, &other| {
-        let pairs = rows.row(one).into_iter().zip(rows.row(other));
-        let mut orders = pairs.map(|(one, other)| one.total_cmp(other));
-        orders
-            .find(|order| order.is_ne())
-            .unwrap_or(std::cmp::Ordering::Equal)
+    let first = rows.column(0).into_iter().copied();
+    let mut order: Vec<(f64, usize)> = first.zip(0..).collect();
+    order.sort_unstable_by(|(a, one), (b, other)| {
+        let rest = || {
+            let pairs = rows.row(*one).into_iter().zip(rows.row(*other));
+            let mut orders = pairs.map(|(one, other)| one.total_cmp(other));
+            orders
+                .find(|order| order.is_ne())
+                .unwrap_or(Ordering::Equal)
+        };
+        a.total_cmp(b).then_with(rest)
     });
-    let rows = rows.select(Axis(0), &order);
-    let rows = rows.view();
-    let (x, t) = parts(rows, settings);
-    let weights = rows.column(settings.leading().saturating_sub(1)).to_owned();
+    let order: Vec<usize> = order.into_iter().map(|(_, row)| row).collect();
+    let of = |columns: Range<usize>| -> Result<Array2<f64>, Failure> {
+        let mut values = Vec::with_capacity(order.len() * columns.len());
+        for &row in &order {
+            values.extend(rows.slice(s![row, columns.clone()]));
+        }
+        let shape = (order.len(), columns.len());
+        Array2::from_shape_vec(shape, values).map_err(|_| Failure::OtherState)
+    };
+    let (x, t) = (
+        of(settings.leading()..rows.ncols())?,
+        of(0..settings.targets)?,
+    );
+    let weight = settings.leading().saturating_sub(1);
+    let weights = rows.column(weight).select(Axis(0), &order);
     let mut data = Dataset::new(&x, &t)?;
     if settings.weighted {
         data = data.with_weights(&weights)?;

@@ -99,6 +99,11 @@ fn one_network_per_group() {
         "30",
     ];
     good(folder, &[&fit[..], &["-o", "models.parquet"]].concat());
+    // In the groups' order, whichever partition was done first.
+    let groups = good(folder, &["sql", "SELECT sensor FROM 'models.parquet'"]);
+    let cells = groups.split('|').map(str::trim);
+    let numbers: Vec<&str> = cells.filter(|cell| cell.parse::<u8>().is_ok()).collect();
+    assert_eq!(numbers, ["0", "1", "2", "3"]);
     assert!(good(folder, &["info", "models.parquet"]).contains("groups    4, by sensor"));
     assert!(good(folder, &["eval", "models.parquet", "rows.csv"]).contains("rows  300"));
     good(
@@ -112,6 +117,15 @@ fn one_network_per_group() {
     good(folder, &["sql", query, "-o", "named.csv"]);
     let fit = ["fit", "named.csv", "--target", "y", "--group-by", "rows"];
     good(folder, &[&fit[..], &["-o", "named.parquet"]].concat());
+    // But for the one of the networks.
+    let query = "SELECT a, b, y, sensor AS model FROM 'rows.csv'";
+    good(folder, &["sql", query, "-o", "named.csv"]);
+    let fit = ["fit", "named.csv", "--target", "y", "--group-by", "model"];
+    let error = bad(folder, &[&fit[..], &["-o", "named.parquet"]].concat());
+    assert!(
+        error.contains("column 'model' cannot be a group"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -185,6 +185,12 @@ impl Fit {
         }
         for name in &self.group_by {
             table.column(name)?;
+            if name == MODEL {
+                return Err(Failure::new(format!(
+                    "column '{name}' cannot be a group, as networks are in a column of this name: rename it, by \
+                     elm sql \"SELECT {name} AS kind, ...\" -o FILE"
+                )));
+            }
         }
         let names = if self.features.is_empty() {
             table

@@ -6,6 +6,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use datafusion::arrow::array::RecordBatch;
+use datafusion::arrow::compute::{
+    SortColumn, concat_batches, lexsort_to_indices, take_record_batch,
+};
 use datafusion::arrow::datatypes::Schema;
 use datafusion::common::{Column, JoinType, ScalarValue};
 use datafusion::dataframe::DataFrame;
@@ -120,7 +123,7 @@ fn quoted(name: &str) -> String {
     format!("\"{}\"", name.replace('"', "\"\""))
 }
 
-/// Writes networks of groups: the groups' columns, then the networks.
+/// Writes networks of groups, in the groups' order: the groups' columns, then the networks.
 pub(crate) fn save_groups(
     path: &Path,
     columns: &Columns,
@@ -133,10 +136,18 @@ pub(crate) fn save_groups(
     let metadata = HashMap::from([(KEY.to_owned(), text)]);
     let fields = first.schema().fields().clone();
     let schema = Arc::new(Schema::new_with_metadata(fields, metadata));
+    let networks = concat_batches(&first.schema(), batches)?;
+    // Partitions end in an order of their own.
+    let by_group = networks.columns().iter().take(columns.groups.len());
+    let by_group: Vec<SortColumn> = by_group
+        .map(|values| SortColumn {
+            values: Arc::clone(values),
+            options: None,
+        })
+        .collect();
+    let networks = take_record_batch(&networks, &lexsort_to_indices(&by_group, None)?)?;
+    let networks = RecordBatch::try_new(Arc::clone(&schema), networks.columns().to_vec())?;
     let mut output = Output::create(path, &schema)?;
-    for batch in batches {
-        let batch = RecordBatch::try_new(Arc::clone(&schema), batch.columns().to_vec())?;
-        output.write(&batch)?;
-    }
+    output.write(&networks)?;
     output.finish()
 }
