@@ -36,10 +36,10 @@
 //! triangle of the centered problem, and the intercept is as unpenalized as in a batch fit.
 //!
 //! A given strength of ridge $\lambda$ from about 2e-8 (in `f32` 1e-4) up to 1e6 keeps sums of products well
-//! conditioned. Then these are kept, of centered columns, as a batch fit takes them then: output weights are off
-//! by no more than epsilon over $\lambda$, for less than half the time. Of a residual below the root of epsilon
-//! times the targets' norm [`Diagnosis::residual_norm`](crate::solve::Diagnosis::residual_norm) has no digits,
-//! as there are no rows to take it from.
+//! conditioned. Then these are kept, of centered columns, as a batch fit takes them then: output weights are
+//! off by no more than epsilon over $\lambda$, for less than half the time. Of a residual below the root of
+//! epsilon times the targets' norm [`Diagnosis::residual_norm`](crate::solve::Diagnosis::residual_norm) has
+//! no digits, as there are no rows to take it from.
 
 mod chunks;
 mod forget;
@@ -113,8 +113,8 @@ pub struct Accumulator<A: Scalar, D: TargetDim = Ix2> {
     far: Vec<u64>,
     /// Whether rows may be unlike those that the scaler was measured on.
     unlike_rows: bool,
-    /// What is kept of the rows, an upper half, square: the triangle, or [sums of products](products). Columns
-    /// are the ones (with an intercept), neurons, outputs.
+    /// What is kept of the rows, an upper half, square: the triangle, or [sums of products](products).
+    /// Columns are the ones (with an intercept), neurons, outputs.
     #[cfg_attr(feature = "serde", serde(with = "upper"))]
     kept: Array2<A>,
     /// Powers of two that these columns were divided by.
@@ -454,7 +454,8 @@ fn largest<A: Scalar>(rows: &ArrayRef2<A>) -> Array1<A> {
     largest
 }
 
-/// Rows that enter together with this solver, of this number of columns. Sums of products cost the same by any number.
+/// Rows that enter together with this solver, of this number of columns. Sums of products cost the same by
+/// any number.
 fn block<A: Scalar>(solver: Solver, columns: usize) -> usize {
     match solver.strength_for_products::<A>() {
         Some(_) => columns,

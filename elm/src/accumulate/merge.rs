@@ -78,8 +78,8 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
         Ok(())
     }
 
-    /// Lets all rows enter the triangle or the sums, of which a file then holds little more: half the square of
-    /// neurons and outputs in numbers, where rows that wait to enter together are several times as many.
+    /// Lets all rows enter the triangle or the sums, of which a file then holds little more: half the square
+    /// of neurons and outputs in numbers, where rows that wait to enter together are several times as many.
     /// Costs a factorization where a triangle is kept. Rows that are fewer numbers than it stay as they are.
     ///
     /// # Errors

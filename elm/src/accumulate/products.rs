@@ -1,9 +1,9 @@
 //! Sums of products in the place of the triangle, where a given strength of ridge leaves these their digits.
 //!
 //! They cost half the arithmetic of a triangle, and merging adds them up. With an intercept they are those of
-//! centered columns, and merged by the distance of the means (Chan, Golub and LeVeque, Algorithms for Computing
-//! the Sample Variance, 1983, for one column), so that no sum is a small difference of large ones, in whatever
-//! order the rows come.
+//! centered columns, and merged by the distance of the means (Chan, Golub and LeVeque, Algorithms for
+//! Computing the Sample Variance, 1983, for one column), so that no sum is a small difference of large ones,
+//! in whatever order the rows come.
 
 use ndarray::{Array1, Array2, Axis, ShapeBuilder, Zip, s};
 

@@ -262,5 +262,14 @@ fn accumulators() -> Vec<Seed> {
             ),
         ),
         seed("single.json", true, &filled(&ElmParams::<f32>::new(1), 4)),
+        // Sums of products.
+        seed(
+            "strong.elm",
+            false,
+            &filled(
+                &ElmParams::<f64>::new(2).with_solver(Ridge::relative(1e-3)),
+                3,
+            ),
+        ),
     ]
 }
