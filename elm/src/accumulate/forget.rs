@@ -48,11 +48,10 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
             });
         }
         let root = A::from_f64(factor.sqrt());
-        if self.keeps_products() {
-            self.kept *= A::from_f64(factor);
-        } else {
-            self.kept *= root;
-        }
+        self.kept *= match self.keeps_products() {
+            true => root * root,
+            false => root,
+        };
         self.pending.iter_mut().for_each(|value| *value *= root);
         self.drop_weightless_rows();
         let shrunk = |rows: u64| rows as f64 * factor;

@@ -103,7 +103,7 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
             root_weights: Array1::zeros(0),
             weight_scale: A::one(),
             total_weight: A::one(),
-            hidden_mean: Array1::zeros(self.columns() - self.outputs - usize::from(self.intercept)),
+            hidden_mean: Array1::zeros(self.places().0.len()),
             target_mean: Array1::zeros(self.outputs),
             hidden_scale: A::one(),
             target_scale: Array1::ones(self.outputs),

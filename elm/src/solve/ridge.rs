@@ -166,7 +166,7 @@ impl Ridge {
         match self.lambda {
             Lambda::Relative(lambda) => {
                 let prepared = EquilibratedProblem::new(problem);
-                if self.strength_for_products::<A>().is_some()
+                if gram::allowed::<A>(lambda)
                     && let Some(solution) = gram::solve(&prepared, lambda)
                 {
                     return Ok(solution);
