@@ -42,8 +42,6 @@ const VIEWS: usize = 16;
 /// model reflects.
 const PILOT: u32 = 512;
 const FINAL: u32 = 1024;
-/// The first where the model is not isotropic.
-const PILOT_DIRECTED: u32 = 2048;
 /// Least shares of the cosine and of all directions alike, so that what was missed is found as well, next to
 /// the horizon, too.
 const LEAST: [f64; 2] = [0.07, 0.03];
@@ -51,7 +49,7 @@ const LEAST: [f64; 2] = [0.07, 0.03];
 const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 /// Coefficients of a weight as a polynomial in the viewer's cosine.
 pub const TERMS: usize = 4;
-/// Steps of the search for the weights, with all lobes and after each that is left out.
+/// Steps of the search for the weights, with all lobes or with the last, and after some are left out.
 const STEPS: usize = 40;
 const STEPS_AFTER: usize = 8;
 
@@ -168,8 +166,7 @@ impl LobeMixture {
         }
     }
 
-    /// The mixture of a model, by the mean of its channels. Asks it at 8,192 pairs, at 32,768 if it is not
-    /// isotropic.
+    /// The mixture of a model, by the mean of its channels. Asks it at 8,192 pairs.
     ///
     /// # Errors
     /// Those of the model's own evaluation.
@@ -194,8 +191,7 @@ impl LobeMixture {
     /// Where a model is asked before anything is known of it.
     #[must_use]
     pub fn pilot(isotropic: bool) -> Points {
-        let count = if isotropic { PILOT } else { PILOT_DIRECTED };
-        Points::of(&Self::candidates(isotropic), count)
+        Points::of(&Self::candidates(isotropic), PILOT)
     }
 
     /// Mirror and retro-reflection at each viewing angle, where models peak.
@@ -224,16 +220,7 @@ impl LobeMixture {
         let mut mixture = Self::candidates(isotropic);
         let mut problem = Problem::new(&mixture, points, values);
         problem.improve(&mut mixture, STEPS);
-        while mixture.lobes.len() > LEAST.len() + KEPT {
-            let least = (LEAST.len()..mixture.lobes.len())
-                .map(|lobe| (lobe, problem.objective(&mixture, Some(lobe))))
-                .min_by(|a, b| a.1.total_cmp(&b.1));
-            let Some((lobe, _)) = least else { break };
-            mixture.lobes.remove(lobe);
-            problem.densities.remove(lobe);
-            mixture.normalize();
-            problem.improve(&mut mixture, STEPS_AFTER);
-        }
+        problem.eliminate(&mut mixture, LEAST.len() + KEPT);
         problem.refine(points, &mut mixture);
         problem.improve(&mut mixture, STEPS);
         mixture
@@ -284,9 +271,8 @@ impl LobeMixture {
         &self.lobes
     }
 
-    /// The lobes with their shares for a viewer.
-    fn shares(&self, outgoing: Vector) -> impl Iterator<Item = (Lobe, f64)> {
-        let terms = terms(outgoing[2]);
+    /// The lobes with their shares at a viewer's [`terms`].
+    fn shares(&self, terms: [f64; TERMS]) -> impl Iterator<Item = (Lobe, f64)> {
         let share =
             move |weights: &[f64; TERMS]| weights.iter().zip(terms).map(|(w, t)| w * t).sum();
         self.lobes
@@ -297,7 +283,7 @@ impl LobeMixture {
     /// The lobe that a uniform number chooses, and where in that lobe's share the number lies, from 0 to 1.
     fn choose(&self, outgoing: Vector, u: f64) -> (Lobe, f64) {
         let (mut before, mut chosen) = (0.0, (Lobe::Cosine, u));
-        for (lobe, share) in self.shares(outgoing) {
+        for (lobe, share) in self.shares(terms(outgoing[2])) {
             if share > 0.0 && u >= before {
                 chosen = (lobe, ((u - before) / share).min(1.0 - f64::EPSILON));
             }
@@ -322,7 +308,7 @@ impl LobeMixture {
             return 0.0;
         }
         let parts = self
-            .shares(outgoing)
+            .shares(terms(outgoing[2]))
             .map(|(lobe, share)| share * lobe.density(outgoing, incident));
         parts.sum()
     }
@@ -350,7 +336,7 @@ mod tests {
             .collect();
         let found = LobeMixture::fit(&points, &values, true);
         let outgoing = cartesian(1.0, 0.0);
-        let shares: Vec<(Lobe, f64)> = found.shares(outgoing).collect();
+        let shares: Vec<(Lobe, f64)> = found.shares(terms(outgoing[2])).collect();
         let ggx = shares.iter().filter(
             |(lobe, _)| matches!(lobe, Lobe::Ggx { alpha: [alpha, _], .. } if (alpha / 0.06 - 1.0).abs() < 0.2),
         );

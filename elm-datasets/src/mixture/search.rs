@@ -1,15 +1,21 @@
 //! The search for a mixture's weights, widths and tilts.
 
+use std::ops::Range;
+
+use ndarray::{Array1, ArrayView1};
+
 use super::{LEAST, LobeMixture, Points, STEPS_AFTER, TERMS, VIEWS, terms, view_angle};
 
 /// Rounds of the search for widths and tilts.
 const ROUNDS: usize = 4;
+/// The part of the lobes that may go which goes between searches for weights, as a divisor.
+const QUARTER: usize = 4;
 
 /// The search for weights: the least sum over viewing angles of the logarithm of the second moment of
 /// $f \cos\theta_i$ over the density.
 pub(super) struct Problem {
     /// Of each lobe at each point.
-    pub(super) densities: Vec<Vec<f64>>,
+    densities: Vec<Vec<f64>>,
     /// The square of f cos theta_i at each point, times its solid angle.
     squares: Vec<f64>,
     terms: Vec<[f64; TERMS]>,
@@ -37,55 +43,102 @@ impl Problem {
         }
     }
 
-    /// Density of the mixture at each point of a view, without one lobe if that is asked.
-    fn mixed(&self, mixture: &LobeMixture, view: usize, without: Option<usize>) -> Vec<f64> {
+    /// Those of a view.
+    fn points(&self, view: usize) -> Range<usize> {
         let count = self.squares.len() / VIEWS;
-        let mut mixed = vec![0.0; count];
-        let mut total = 0.0;
-        for (lobe, (_, weights)) in mixture.lobes.iter().enumerate() {
-            if without == Some(lobe) {
-                continue;
-            }
-            let share: f64 = weights
-                .iter()
-                .zip(self.terms[view])
-                .map(|(w, t)| w * t)
-                .sum();
-            total += share;
-            let densities = &self.densities[lobe][view * count..(view + 1) * count];
-            for (sum, density) in mixed.iter_mut().zip(densities) {
+        view * count..(view + 1) * count
+    }
+
+    /// The lobes' parts of the density at a view.
+    fn shares(&self, mixture: &LobeMixture, view: usize) -> Vec<f64> {
+        let shares: Vec<f64> = mixture
+            .shares(self.terms[view])
+            .map(|(_, share)| share)
+            .collect();
+        let total: f64 = shares.iter().sum();
+        shares.iter().map(|share| share / total).collect()
+    }
+
+    /// Density of the mixture at each point of a view.
+    fn mixed(&self, mixture: &LobeMixture, view: usize) -> Vec<f64> {
+        let points = self.points(view);
+        let mut mixed = vec![0.0; points.len()];
+        let shares = self.shares(mixture, view);
+        for (share, densities) in shares.iter().zip(&self.densities) {
+            for (sum, density) in mixed.iter_mut().zip(&densities[points.clone()]) {
                 *sum += share * density;
             }
         }
         for density in &mut mixed {
-            *density = (*density / total).max(f64::MIN_POSITIVE);
+            *density = density.max(f64::MIN_POSITIVE);
         }
         mixed
     }
 
-    pub(super) fn objective(&self, mixture: &LobeMixture, without: Option<usize>) -> f64 {
-        let count = self.squares.len() / VIEWS;
+    fn objective(&self, mixture: &LobeMixture) -> f64 {
         let moment = |view: usize| -> f64 {
-            let squares = &self.squares[view * count..(view + 1) * count];
-            let mixed = self.mixed(mixture, view, without);
-            squares.iter().zip(&mixed).map(|(s, p)| s / p).sum()
+            let squares = &self.squares[self.points(view)];
+            let ratios = squares.iter().zip(self.mixed(mixture, view));
+            ratios.map(|(s, p)| s / p).sum()
         };
         let moments = (0..VIEWS).map(moment).filter(|&m| m > 0.0);
         moments.map(f64::ln).sum()
+    }
+
+    /// Of those that may be left out, the lobe without which the objective is least.
+    fn least(&self, mixture: &LobeMixture) -> Option<usize> {
+        let mut objectives = vec![0.0; mixture.lobes.len()];
+        for view in 0..VIEWS {
+            let points = self.points(view);
+            let squares = &self.squares[points.clone()];
+            let mixed = self.mixed(mixture, view);
+            let shares = self.shares(mixture, view);
+            for lobe in LEAST.len()..mixture.lobes.len() {
+                let share = shares[lobe];
+                // The least shares of the others keep the difference's digits.
+                let ratio = |((s, p), density): ((&f64, &f64), &f64)| {
+                    s / (p - share * density).max(f64::MIN_POSITIVE)
+                };
+                let all = squares
+                    .iter()
+                    .zip(&mixed)
+                    .zip(&self.densities[lobe][points.clone()]);
+                let moment = (1.0 - share) * all.map(ratio).sum::<f64>();
+                if moment > 0.0 {
+                    objectives[lobe] += moment.ln();
+                }
+            }
+        }
+        (LEAST.len()..mixture.lobes.len()).min_by(|&a, &b| objectives[a].total_cmp(&objectives[b]))
+    }
+
+    /// Leaves out lobes until `kept` are left, and searches for weights after each quarter.
+    pub(super) fn eliminate(&mut self, mixture: &mut LobeMixture, kept: usize) {
+        while mixture.lobes.len() > kept {
+            for _ in 0..(mixture.lobes.len() - kept).div_ceil(QUARTER) {
+                let Some(lobe) = self.least(mixture) else {
+                    return;
+                };
+                mixture.lobes.remove(lobe);
+                self.densities.remove(lobe);
+                mixture.normalize();
+            }
+            self.improve(mixture, STEPS_AFTER);
+        }
     }
 
     /// Takes widths and tilts between those tried.
     pub(super) fn refine(&mut self, points: &Points, mixture: &mut LobeMixture) {
         let mut factor = 1.25_f64;
         for _ in 0..ROUNDS {
-            let mut best = self.objective(mixture, None);
+            let mut best = self.objective(mixture);
             for index in LEAST.len()..mixture.lobes.len() {
                 for lobe in mixture.lobes[index].0.variations(factor) {
                     let before = mixture.lobes[index].0;
                     mixture.lobes[index].0 = lobe;
                     let densities =
                         std::mem::replace(&mut self.densities[index], points.densities(lobe));
-                    let found = self.objective(mixture, None);
+                    let found = self.objective(mixture);
                     if found < best {
                         best = found;
                     } else {
@@ -103,24 +156,23 @@ impl Problem {
     /// the sum of r^2 s / (w p_lobe) for any other weights w, which is least for w as the root of its
     /// coefficient.
     pub(super) fn improve(&mut self, mixture: &mut LobeMixture, steps: usize) {
-        let count = self.squares.len() / VIEWS;
         for _ in 0..steps {
             let mut gains = vec![[0.0; TERMS]; mixture.lobes.len()];
             for view in 0..VIEWS {
-                let squares = &self.squares[view * count..(view + 1) * count];
-                let mixed = self.mixed(mixture, view, None);
+                let points = self.points(view);
+                let squares = &self.squares[points.clone()];
+                let mixed = self.mixed(mixture, view);
                 let moment: f64 = squares.iter().zip(&mixed).map(|(s, p)| s / p).sum();
                 if moment.is_nan() || moment <= 0.0 {
                     continue;
                 }
-                let ratios: Vec<f64> = squares
+                let ratios: Array1<f64> = squares
                     .iter()
                     .zip(&mixed)
                     .map(|(s, p)| s / (p * p))
                     .collect();
                 for (gain, densities) in gains.iter_mut().zip(&self.densities) {
-                    let densities = &densities[view * count..(view + 1) * count];
-                    let sum: f64 = densities.iter().zip(&ratios).map(|(d, r)| d * r).sum();
+                    let sum = ratios.dot(&ArrayView1::from(&densities[points.clone()]));
                     for (gain, term) in gain.iter_mut().zip(self.terms[view]) {
                         *gain += sum / moment * term;
                     }
