@@ -92,7 +92,7 @@ pub fn builtin(name: &str, material: Option<&MaterialTable>) -> Result<Sheet, Er
             Ok(Sheet {
                 columns: 5,
                 panels,
-                caption: "{data}. Differences are of radiance, times 4.".to_owned(),
+                caption: "{data}. Differences of radiance, times 4.".to_owned(),
             })
         }
         _ => Err(Error::UnknownBuiltin {
@@ -152,7 +152,7 @@ samples = 16
 [camera]
 position = [0, 0, 5]
 target = [0, 0, 0]
-height = 2.3
+height = 2.8
 
 [material.subject]
 SUBJECT
@@ -176,7 +176,7 @@ samples = 16
 [camera]
 position = [0, 0, 5]
 target = [0, 0, 0]
-height = 2.3
+height = 2.8
 
 [material.subject]
 SUBJECT

@@ -1,5 +1,6 @@
 //! What must hold before a commit (`check`) and before a change lands (`all`).
 
+use std::process::Command;
 use std::time::Instant;
 
 use crate::Result;
@@ -53,6 +54,13 @@ fn tools() -> Result {
     )
 }
 
+/// With clippy for a compiler and warnings as errors: what is tested is built once.
+fn linted(mut command: Command) -> Command {
+    command.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
+    command.env("RUSTFLAGS", "-D warnings");
+    command
+}
+
 /// Everything: all tests that can run here, documentation, both linear algebra back ends, fuzz
 /// targets, packages, and the README's first command.
 pub(crate) fn all() -> Result {
@@ -61,7 +69,11 @@ pub(crate) fn all() -> Result {
     let has_data = has_data();
 
     step("formatting");
-    run(command("cargo fmt --all --check"))?;
+    for workspace in ["", "elm-datafusion", "elm-python", "fuzz"] {
+        let mut format = command("cargo fmt --all --check");
+        format.current_dir(root().join(workspace));
+        run(format)?;
+    }
 
     step("clippy, warnings are errors");
     run(command(
@@ -109,7 +121,7 @@ pub(crate) fn all() -> Result {
 
     step("the fuzz targets, three seconds each");
     // Optimized for few inputs, not for billions.
-    let mut fuzz = command("fuzz/run -s 3");
+    let mut fuzz = linted(command("fuzz/run -s 3"));
     fuzz.env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "1");
     run(fuzz)?;
 
@@ -120,14 +132,9 @@ pub(crate) fn all() -> Result {
     python()?;
 
     step("SQL: the package elm-datafusion");
-    for line in ["cargo fmt --check", "cargo test --locked"] {
-        let mut own = command(line);
-        own.current_dir(root().join("elm-datafusion"));
-        // As `cargo clippy` does it, but for what is tested as well: a database is built once.
-        own.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
-        own.env("RUSTFLAGS", "-D warnings");
-        run(own)?;
-    }
+    let mut own = linted(command("cargo test --locked"));
+    own.current_dir(root().join("elm-datafusion"));
+    run(own)?;
 
     step("packages");
     Packaging::contents().run()?;

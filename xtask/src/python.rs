@@ -1,4 +1,4 @@
-//! The Python package: its wheel, installed into a fresh environment away from the checkout, and its tests.
+//! The Python package: its wheel, built without warnings and installed away from the checkout, and its tests.
 
 use std::fs;
 use std::io;
@@ -31,10 +31,12 @@ pub(crate) fn python() -> Result {
         return Ok(());
     }
     // In the workspace's own target folder, for the dependencies that both have.
-    let wheel = command(&format!(
+    let mut wheel = command(&format!(
         "{FOLDER}/tools/bin/maturin build --release --locked --manifest-path elm-python/Cargo.toml \
-         --target-dir target --out {FOLDER}/wheels"
+         --target-dir target --out {FOLDER}/wheels -- -D warnings"
     ));
+    // Warnings of this package alone: flags for all would build shared dependencies again.
+    wheel.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
     run(wheel)?;
 
     run(command(&format!("python3 -m venv {FOLDER}/installed")))?;
