@@ -8,7 +8,7 @@ use super::{LEAST, LobeMixture, Points, STEPS_AFTER, TERMS, VIEWS, terms, view_a
 
 /// Rounds of the search for widths and tilts.
 const ROUNDS: usize = 4;
-/// The part of the lobes that may go which goes between searches for weights, as a divisor.
+/// Of the lobes that are too many, the part that is left out between searches for weights, as a divisor.
 const QUARTER: usize = 4;
 
 /// The search for weights: the least sum over viewing angles of the logarithm of the second moment of
