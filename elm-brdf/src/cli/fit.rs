@@ -44,6 +44,9 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NAME", conflicts_with = "prior",
           value_parser = one_of::<Features>(Features::ALL.map(Features::name)))]
     features: Option<Features>,
+    /// Choose among inputs that do not tell light from viewer: the model is then reciprocal.
+    #[arg(long, conflicts_with_all = ["features", "prior"])]
+    reciprocal: bool,
     /// The held-out error that is made small. With --prior it is the error of the logarithm,
     /// whatever is said here.
     #[arg(long, value_name = "NAME", default_value = "rmse",
@@ -82,6 +85,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(prior) => prior.fit_model(pairs, values)?,
         None => Tuned {
             features: arguments.features,
+            reciprocal: arguments.reciprocal,
             metric: arguments.metric,
             neurons: arguments.neurons,
             max_floats: arguments.max_floats,

@@ -47,6 +47,7 @@ use size::Width;
 /// | name | default | purpose |
 /// |---|---|---|
 /// | `features` | chosen | the inputs |
+/// | `reciprocal` | no | whether to choose among reciprocal inputs only |
 /// | `metric` | RMSE | the held-out error that is made small |
 /// | `neurons` | see below | size of the network |
 /// | `max_floats` | none | most numbers that the model may store |
@@ -104,6 +105,8 @@ use size::Width;
 pub struct Tuned {
     /// Inputs; `None` to choose.
     pub features: Option<Features>,
+    /// Whether to choose among reciprocal inputs only.
+    pub reciprocal: bool,
     /// The error that is made small.
     pub metric: Metric,
     /// Neurons; `None` for the default.
@@ -118,6 +121,7 @@ impl Default for Tuned {
     fn default() -> Self {
         Self {
             features: None,
+            reciprocal: false,
             metric: Metric::Rmse,
             neurons: None,
             max_floats: None,
@@ -241,7 +245,10 @@ impl Tuned {
             // In the direction that is found.
             Some(set) if !set.is_isotropic() => vec![grain.unwrap_or(set)],
             Some(set) => vec![set],
-            None => sets.iter().copied().chain(grain).collect(),
+            None => {
+                let allowed = |set: &Features| !self.reciprocal || set.is_reciprocal();
+                sets.iter().copied().filter(allowed).chain(grain).collect()
+            }
         }
     }
 

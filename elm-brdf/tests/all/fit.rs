@@ -44,6 +44,7 @@ fn a_table_of_ones_own_becomes_a_model_that_meets_other_measurements() {
             &["--max-floats", "150", "--metric", "cube-root"],
         ),
         ("given.elm", &["--neurons", "40", "--features", "half-diff"]),
+        ("reciprocal.elm", &["--reciprocal"]),
     ] {
         let model = path(name);
         let fixed = [
@@ -145,6 +146,19 @@ fn what_cannot_be_fitted_or_judged_is_one_line_and_leaves_no_file() {
             2,
             vec!["fit", two, "-o", out, "--prior", broken, "--neurons", "9"],
             "--neurons",
+        ),
+        (
+            2,
+            vec![
+                "fit",
+                two,
+                "-o",
+                out,
+                "--reciprocal",
+                "--features",
+                "cosines",
+            ],
+            "--features",
         ),
         (1, vec!["eval", broken, two], "broken.elm"),
         (1, vec!["eval", model, one], "channels"),

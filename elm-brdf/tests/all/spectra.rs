@@ -62,6 +62,7 @@ fn fitted(samples: &Samples, tuned: &Tuned) -> BrdfModel {
 
 const LOG_COSINE: Tuned = Tuned {
     features: None,
+    reciprocal: false,
     metric: Metric::LogCosine,
     neurons: Some(60),
     max_floats: None,

@@ -248,6 +248,34 @@ fn what_is_called_held_out_is_of_the_network_itself() {
 }
 
 #[test]
+fn a_reciprocal_model_can_be_asked_for_where_measurements_are_not() {
+    for rows in [300, 1700] {
+        let pairs = scattered(rows, 1.45, 14);
+        let mut values = measured(plastic, &pairs, 0.001);
+        for (mut row, pair) in values.rows_mut().into_iter().zip(&pairs) {
+            row *= 1.0 + 0.5 * (pair.incident[2] - pair.outgoing[2]);
+        }
+        let exchanged: Vec<DirectionPair> = pairs
+            .iter()
+            .map(|pair| DirectionPair {
+                incident: pair.outgoing,
+                outgoing: pair.incident,
+            })
+            .collect();
+        for reciprocal in [false, true] {
+            let tuned = Tuned {
+                reciprocal,
+                neurons: Some(40),
+                ..Tuned::default()
+            };
+            let model = tuned.fit_model(&pairs, values.view()).unwrap();
+            let (one, other) = (model.eval(&pairs).unwrap(), model.eval(&exchanged).unwrap());
+            assert_eq!(one == other, reciprocal, "{rows} {}", model.features());
+        }
+    }
+}
+
+#[test]
 fn the_size_of_a_network_is_bounded_by_what_was_measured() {
     let all = scattered(120, 1.4, 12);
     for rows in [1, 2, 5, 20, 120] {
