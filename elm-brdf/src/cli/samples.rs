@@ -128,7 +128,7 @@ pub(super) struct Material {
 }
 
 impl Material {
-    /// How many values were missing or negative, and what became of them.
+    /// How many values were missing, negative or zero, and what became of them.
     pub(super) fn counts(&self, way: Invalid) -> String {
         let fills: Vec<String> = self.fills.iter().map(f64::to_string).collect();
         let standing = match fills.as_slice() {
@@ -141,8 +141,17 @@ impl Material {
             (_, Invalid::Keep) => ", kept",
             (_, Invalid::Drop) => ", their measurements left out",
         };
+        let zero = self.samples.values.iter().filter(|&&v| v == 0.0).count();
+        let zero = match way {
+            Invalid::Clamp => zero.saturating_sub(self.invalid),
+            Invalid::Keep | Invalid::Drop => zero,
+        };
+        let zero = match zero {
+            0 => String::new(),
+            count => format!(", {count} zero, kept"),
+        };
         format!(
-            "{} values missing{standing}, {} negative{treated}; {} measurements left out",
+            "{} values missing{standing}, {} negative{treated}{zero}; {} measurements left out",
             self.missing, self.invalid, self.left_out
         )
     }

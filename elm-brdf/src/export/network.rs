@@ -1,6 +1,8 @@
 //! A network as exports need it: standardisation folded into the weights, neurons in order of their
 //! functions, all numbers in the range of single precision.
 
+use elm::Activation;
+
 use super::error::ExportError;
 use crate::features::Features;
 use crate::model::BrdfModel;
@@ -145,6 +147,11 @@ impl Network {
         let of_group = of_group.flat_map(|group| std::iter::repeat_n(group, group.neurons()));
         for (neuron, group) in of_group.enumerate() {
             let activation = group.activation().name();
+            // One of the user's own may have the name of another.
+            if let Activation::Custom(_) = group.activation() {
+                let name = activation.to_owned();
+                return Err(ExportError::Activation { name });
+            }
             let betas = beta.row(neuron).to_vec();
             let own = hidden.weights().column(neuron).to_vec();
             if let Some(scales) = group.input_scales() {

@@ -301,12 +301,15 @@ fn what_cannot_be_exported_is_an_error_of_its_own() {
         };
         params.fit(pairs, samples.values.view()).unwrap()
     };
-    let custom = model(network(
-        9,
-        Activation::custom("softsign", |z: f64| z / (1.0 + z.abs())),
-    ));
-    let error = source(&custom, Language::C, "m").unwrap_err();
-    assert_eq!(error.to_string(), "cannot export the activation 'softsign'");
+    for name in ["of my own", "tanh"] {
+        let function = Activation::custom(name, |z: f64| z / (1.0 + z.abs()));
+        let custom = model(network(9, function));
+        let error = source(&custom, Language::C, "m").unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            format!("cannot export the activation '{name}'")
+        );
+    }
     let huge = model(
         network(9, Activation::Sine)
             .with_scale(1e300)

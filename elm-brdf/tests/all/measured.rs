@@ -283,8 +283,12 @@ fn what_was_missing_or_assumed_is_said() {
     assert!(bench.rmse("m.elm", "clean.csv", &["--degrees"]) < 0.02);
     // Of a file without any the count is printed too.
     let (said, notes) = bench.run(&["eval", "m.elm", "clean.csv", "--degrees"]);
-    assert!(said.contains("0 values missing, 0 negative"), "{said}");
+    assert!(said.contains("0 values missing, 0 negative;"), "{said}");
     assert_eq!(notes, "");
+    let zero = table(&[("brdf", 1.0)]) + "40,0,40,90,0\n";
+    bench.write("zero.csv", &zero);
+    let (said, _) = bench.run(&["eval", "m.elm", "zero.csv", "--degrees"]);
+    assert!(said.contains("0 negative, 1 zero, kept;"), "{said}");
 }
 
 #[test]

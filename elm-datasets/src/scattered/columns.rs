@@ -217,7 +217,7 @@ fn find_angles(
     named: &[Option<Named>],
     choice: &Columns,
 ) -> Result<Found, Problem> {
-    let (places, difference) = places_of_angles(names, named)?;
+    let (places, difference) = places_of_angles(names, named, choice)?;
     let mut angles = [Angle::Constant(0.0); 4];
     let (mut missing, mut no_azimuth) = (Vec::new(), Vec::new());
     for place in 0..4 {
@@ -264,12 +264,19 @@ fn find_angles(
 }
 
 /// Finds the column of each angle by its name; none may have two.
-fn places_of_angles(names: &[String], named: &[Option<Named>]) -> Result<Places, Problem> {
+fn places_of_angles(
+    names: &[String],
+    named: &[Option<Named>],
+    choice: &Columns,
+) -> Result<Places, Problem> {
+    let [theta_i, phi_i, theta_o, phi_o] = choice.angles.map(|angle| angle.is_some());
     let of = |side: Side| {
         let is = move |named: &Named| matches!(named.0, Direction::Theta(other) | Direction::Phi(other) if other == side);
         named.iter().flatten().any(is)
     };
-    let scatter = match (of(Side::Light), of(Side::Viewer)) {
+    let light = theta_i || phi_i || of(Side::Light);
+    let viewer = theta_o || phi_o || of(Side::Viewer);
+    let scatter = match (light, viewer) {
         (true, false) => Some(Side::Viewer),
         (false, true) => Some(Side::Light),
         _ => None,

@@ -150,6 +150,10 @@ fn an_angle_that_is_no_column_can_be_given() {
     for pair in &found.samples.directions {
         assert!((pair.incident[2] - 0.5).abs() < 1e-15);
     }
+    // It says of which side a column is whose name does not.
+    let either = text.replace("theta_o,phi_o", "theta_s,phi_s");
+    let same = read(dir.path(), "b.csv", either, &options).unwrap();
+    assert_eq!(same.samples, found.samples);
     options.columns.angles[2] = Some(10.0);
     let message = read(dir.path(), "a.csv", text, &options)
         .unwrap_err()
