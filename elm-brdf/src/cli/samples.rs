@@ -128,7 +128,7 @@ pub(super) struct Material {
 }
 
 impl Material {
-    /// How many values were missing, negative or zero, and what became of them.
+    /// How many values were missing or negative, what became of them, and how many are zero now.
     pub(super) fn counts(&self, way: Invalid) -> String {
         let fills: Vec<String> = self.fills.iter().map(f64::to_string).collect();
         let standing = match fills.as_slice() {
@@ -141,17 +141,13 @@ impl Material {
             (_, Invalid::Keep) => ", kept",
             (_, Invalid::Drop) => ", their measurements left out",
         };
-        let zero = self.samples.values.iter().filter(|&&v| v == 0.0).count();
-        let zero = match way {
-            Invalid::Clamp => zero.saturating_sub(self.invalid),
-            Invalid::Keep | Invalid::Drop => zero,
-        };
-        let zero = match zero {
+        let values = &self.samples.values;
+        let zero = match values.iter().filter(|&&value| value == 0.0).count() {
             0 => String::new(),
-            count => format!(", {count} zero, kept"),
+            count => format!("; {count} of {} values are 0", values.len()),
         };
         format!(
-            "{} values missing{standing}, {} negative{treated}{zero}; {} measurements left out",
+            "{} values missing{standing}, {} negative{treated}; {} measurements left out{zero}",
             self.missing, self.invalid, self.left_out
         )
     }

@@ -65,6 +65,10 @@ fn a_table_of_ones_own_becomes_a_model_that_meets_other_measurements() {
         let floats = found["stored_floats"].as_u64().unwrap();
         assert!(name != "small.json" || floats <= 150, "{floats}");
         assert!(name != "given.elm" || found["neurons"] == 40);
+        if name == "reciprocal.elm" {
+            let model = elm_brdf::model::BrdfModel::load(&model).unwrap();
+            assert!(model.features().is_reciprocal(), "{}", model.features());
+        }
         let correlation = found["metrics"]["correlation"].as_f64().unwrap();
         assert!(correlation > 0.9, "{name}: {correlation}");
         for measure in ["rmse", "mae", "log_cosine_mae", "cube_root_rmse"] {

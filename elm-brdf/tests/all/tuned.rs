@@ -255,13 +255,7 @@ fn a_reciprocal_model_can_be_asked_for_where_measurements_are_not() {
         for (mut row, pair) in values.rows_mut().into_iter().zip(&pairs) {
             row *= 1.0 + 0.5 * (pair.incident[2] - pair.outgoing[2]);
         }
-        let exchanged: Vec<DirectionPair> = pairs
-            .iter()
-            .map(|pair| DirectionPair {
-                incident: pair.outgoing,
-                outgoing: pair.incident,
-            })
-            .collect();
+        let exchanged: Vec<DirectionPair> = pairs.iter().map(|pair| pair.swapped()).collect();
         for reciprocal in [false, true] {
             let tuned = Tuned {
                 reciprocal,

@@ -154,6 +154,11 @@ fn an_angle_that_is_no_column_can_be_given() {
     let either = text.replace("theta_o,phi_o", "theta_s,phi_s");
     let same = read(dir.path(), "b.csv", either, &options).unwrap();
     assert_eq!(same.samples, found.samples);
+    let mut of_viewer = degrees();
+    of_viewer.columns.angles[2] = Some(60.0);
+    let light = read(dir.path(), "c.csv", "theta_s,brdf\n30,0.25\n", &of_viewer).unwrap();
+    let incident = light.samples.directions[0].incident;
+    assert!((incident[2] - 30.0_f64.to_radians().cos()).abs() < 1e-15);
     options.columns.angles[2] = Some(10.0);
     let message = read(dir.path(), "a.csv", text, &options)
         .unwrap_err()
