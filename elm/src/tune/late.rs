@@ -29,8 +29,8 @@ const FEWEST: usize = 50;
 const ROWS: usize = 2;
 
 /// The fit, and its settings. These come with the usual number of neurons: half of them at first, twice as
-/// many while that pays, up to twice the usual number and within `most`; else half as many while that costs
-/// little.
+/// many while that pays, with slopes once more where these paid before or as they are, up to twice the usual
+/// number and within `most`; else half as many while that costs little.
 pub(super) fn fit<A: Scalar, D: TargetDim>(
     params: ElmParams<A>,
     most: Option<usize>,
@@ -56,12 +56,12 @@ pub(super) fn fit<A: Scalar, D: TargetDim>(
             break;
         }
         let again = slopes_paid.then(|| with_slopes(&params, &model, data));
-        let settings = again.flatten().unwrap_or_else(|| params.clone());
-        match with(settings.with_neurons(neurons)) {
-            Some((twice, larger, error)) if error < (1.0 - margin) * least => {
-                (params, model, least) = (twice, larger, error);
-            }
-            _ => break,
+        // Slopes once more can make worse what more neurons would mend.
+        let settings = again.flatten().into_iter().chain([params.clone()]);
+        let mut tried = settings.filter_map(|settings| with(settings.with_neurons(neurons)));
+        match tried.find(|(_, _, error)| *error < (1.0 - margin) * least) {
+            Some((twice, larger, error)) => (params, model, least) = (twice, larger, error),
+            None => break,
         }
         if !slopes_paid && neurons == usual {
             // More neurons have better slopes.
@@ -229,4 +229,39 @@ fn neurons_are_doubled_where_that_pays_and_never_beyond_what_is_asked_for() {
     assert_eq!(neurons(&wave, Some(200)), 200);
     assert_eq!(neurons(&wave, Some(120)), 120);
     assert_eq!(neurons(&plane, None), 60);
+}
+
+#[test]
+fn neurons_are_doubled_where_that_pays_without_slopes_once_more() {
+    use crate::activation::Activation;
+    use crate::solve::Ridge;
+    use crate::{Embedding, Ramps};
+    use ndarray::Array2;
+
+    let x = Array2::from_shape_fn((1600, 5), |(row, input)| {
+        let step = [0.618_034, 0.414_214, 0.732_051, 0.236_068, 0.831][input];
+        (row as f64 * step + 0.658).fract()
+    });
+    // A value of its own for each of 64 cells.
+    let t = x.map_axis(Axis(1), |x| {
+        let (one, other) = ((8.0 * x[0]).floor(), (8.0 * x[1]).floor());
+        let angle: f64 = one * 12.9898 + other * 78.233 + 34.0;
+        (angle.sin() * 43_758.545_3).fract() + 0.3 * x[2]
+    });
+    let ramps = Ramps::of(x.view(), None, 8);
+    let params = ElmParams::new(160)
+        .with_activation(Activation::Tanh)
+        .with_direct_links(true)
+        .with_seed(34)
+        .with_embedding(Embedding::Ramps(ramps))
+        .with_solver(Ridge::leave_one_out());
+    let data = Dataset::new(&x, &t).unwrap();
+    let (few, model) = fit_twice(params.clone().with_neurons(80), &data).unwrap();
+    // Slopes paid before, and would not again.
+    assert!(!few.input_scales().is_empty());
+    let again = with_slopes(&few, &model, &data).unwrap().with_neurons(160);
+    let again = again.fit_dataset(&data).unwrap();
+    let least = (1.0 - MORE.0) * left_out(&model, &data);
+    assert!(left_out(&again, &data) > least);
+    assert_eq!(fit(params, None, &data).unwrap().0.neurons(), 320);
 }
