@@ -4,6 +4,8 @@
 
 mod words;
 
+use std::ops::Range;
+
 use words::{NO_VALUES, VALUES};
 
 /// What a channel is.
@@ -251,28 +253,41 @@ pub(crate) fn kind(name: &str) -> Kind {
     }
 }
 
+/// Words that each say that values are reflectance factors.
+const FACTORS: [&str; 3] = ["brf", "hdrf", "hcrf"];
+
 /// Whether a name says that values are reflectance factors: the BRDF times pi.
 pub(crate) fn is_reflectance_factor(name: &str) -> bool {
     let words = words(name);
     let has = |word: &str| words.iter().any(|other| other == word);
-    ["brf", "hdrf", "hcrf"].into_iter().any(has) || has("reflectance") && has("factor")
+    FACTORS.into_iter().any(has) || has("reflectance") && has("factor")
 }
 
 /// The name of what a column of reflectance factors holds once it is divided by pi: `brdf 550 nm` of
-/// `BRF 550 nm`.
+/// `BRF 550 nm`. It no longer says that they are factors: read again, they must not be divided again.
 pub(crate) fn without_factor(name: &str) -> String {
     let lower = name.trim().to_lowercase();
-    for word in ["hdrf", "hcrf", "brf"] {
-        if lower.contains(word) {
-            return lower.replace(word, "brdf");
+    let (mut renamed, mut end) = (String::new(), 0);
+    for range in word_ranges(&lower) {
+        let (between, word) = (&lower[end..range.start], &lower[range.clone()]);
+        end = range.end;
+        if word == "factor" {
+            // With what separates it from the word before, unless that would join two words.
+            if !lower[end..].is_empty() && !lower[end..].starts_with(is_separator) {
+                renamed.push(' ');
+            }
+            continue;
         }
+        renamed.push_str(between);
+        let is_factor = word == "reflectance" || FACTORS.contains(&word);
+        renamed.push_str(if is_factor { "brdf" } else { word });
     }
-    match (lower.find("reflectance"), lower.rfind("factor")) {
-        (Some(first), Some(last)) if first < last => {
-            format!("{}brdf{}", &lower[..first], &lower[last + "factor".len()..])
-        }
-        _ => "brdf".to_owned(),
-    }
+    renamed.push_str(&lower[end..]);
+    renamed.trim().to_owned()
+}
+
+fn is_separator(c: char) -> bool {
+    !c.is_alphanumeric()
 }
 
 /// Whether a name is a single word, and one that says something else than reflectance.
@@ -323,21 +338,29 @@ fn in_nm(number: f64) -> Option<f64> {
 
 /// The words of a name: runs of letters and numbers, in lower case.
 fn words(name: &str) -> Vec<String> {
-    let mut words: Vec<String> = Vec::new();
-    let mut last = ' ';
     let name = name.to_lowercase();
-    let mut rest = name.chars().peekable();
-    while let Some(c) = rest.next() {
+    let ranges = word_ranges(&name).into_iter();
+    ranges.map(|range| name[range].to_owned()).collect()
+}
+
+/// Where the words of a name in lower case are.
+fn word_ranges(name: &str) -> Vec<Range<usize>> {
+    let mut words: Vec<Range<usize>> = Vec::new();
+    let mut last = ' ';
+    let mut rest = name.char_indices().peekable();
+    while let Some((at, c)) = rest.next() {
+        let next = rest.peek().map(|&(_, next)| next);
         let point =
-            c == '.' && last.is_ascii_digit() && rest.peek().is_some_and(char::is_ascii_digit);
+            c == '.' && last.is_ascii_digit() && next.is_some_and(|next| next.is_ascii_digit());
         let continues = match (last, c) {
             (_, '.') => point,
             (l, c) if c.is_ascii_digit() => l.is_ascii_digit() || l == '.',
             (l, c) => c.is_alphabetic() && l.is_alphabetic(),
         };
+        let end = at + c.len_utf8();
         match words.last_mut() {
-            Some(word) if continues => word.push(c),
-            _ if c.is_alphanumeric() => words.push(c.to_string()),
+            Some(word) if continues => word.end = end,
+            _ if c.is_alphanumeric() => words.push(at..end),
             _ => {}
         }
         last = if c == '.' && !point { ' ' } else { c };
@@ -392,6 +415,30 @@ mod tests {
             same_wavelength(&twice.iter().collect::<Vec<_>>()),
             Some((0, 3))
         );
+    }
+
+    #[test]
+    fn names_of_factors_become_those_of_values() {
+        for (name, expected) in [
+            ("BRF 550 nm", "brdf 550 nm"),
+            ("hdrf550", "brdf550"),
+            ("Reflectance_factor", "brdf"),
+            (
+                "bidirectional reflectance factor (550nm)",
+                "bidirectional brdf (550nm)",
+            ),
+            ("factor of reflectance 550", "of brdf 550"),
+            ("reflectance 550 nm factor", "brdf 550 nm"),
+            ("reflectance550factor650", "brdf550 650"),
+            // Of two words that say it both, and of neither a part.
+            ("BRF 550hcrfm", "brdf 550hcrfm"),
+            ("hcrf/brf", "brdf/brdf"),
+        ] {
+            let renamed = without_factor(name);
+            assert_eq!(renamed, expected);
+            assert!(is_reflectance_factor(name), "{name}");
+            assert!(!is_reflectance_factor(&renamed), "{name}");
+        }
     }
 
     #[test]

@@ -245,13 +245,9 @@ fn without_factors(channels: &[String]) -> Vec<String> {
     let mut renamed: Vec<String> = Vec::with_capacity(channels.len());
     for name in channels {
         let name = channel::without_factor(name);
-        let others = renamed.iter();
-        let same = others.filter(|other| other.starts_with(&name)).count();
-        renamed.push(if same > 0 {
-            format!("{name} ({})", same + 1)
-        } else {
-            name
-        });
+        let numbered = (2..).map(|number| format!("{name} ({number})"));
+        let mut names = std::iter::once(name.clone()).chain(numbered);
+        renamed.extend(names.find(|name| !renamed.contains(name)));
     }
     renamed
 }

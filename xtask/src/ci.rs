@@ -1,12 +1,11 @@
 //! What must hold before a commit (`check`) and before a change lands (`all`).
 
-use std::process::Command;
 use std::time::Instant;
 
 use crate::Result;
 use crate::package::Packaging;
 use crate::python::python;
-use crate::run::{command, root, run, say, test};
+use crate::run::{command, linted, root, run, say, test};
 use crate::tiers::{Tiers, has_data};
 
 /// Formatting, clippy and unit tests.
@@ -54,13 +53,6 @@ fn tools() -> Result {
     )
 }
 
-/// With clippy for a compiler and warnings as errors: what is tested is built once.
-fn linted(mut command: Command) -> Command {
-    command.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
-    command.env("RUSTFLAGS", "-D warnings");
-    command
-}
-
 /// Everything: all tests that can run here, documentation, both linear algebra back ends, fuzz
 /// targets, packages, and the README's first command.
 pub(crate) fn all() -> Result {
@@ -75,33 +67,30 @@ pub(crate) fn all() -> Result {
         run(format)?;
     }
 
-    step("clippy, warnings are errors");
-    run(command(
-        "cargo clippy --workspace --all-targets --locked -- -D warnings",
-    ))?;
-
     // Before the tests, which take most of the time: these are what is forgotten most easily.
-    step("rules for text and for imports");
-    run(command(
+    step("rules for text and for imports; from here on clippy's warnings are errors");
+    run(linted(command(
         "cargo test --workspace --test style --test imports --locked",
-    ))?;
+    )))?;
 
     step("tests, as the README runs them, and those that need something from outside");
-    if has_data {
-        Tiers::everything().run()?;
+    let tiers = if has_data {
+        Tiers::everything()
     } else {
         say("skipped: tests on real measurements");
-        Tiers::without_data().run()?;
-    }
+        Tiers::without_data()
+    };
+    tiers.linted().run()?;
+    // Benchmarks are no tests, and are built by none of the above.
+    run(linted(command(
+        "cargo test --workspace --benches --no-run --locked",
+    )))?;
     // Not among the default features; without data one of them says 'skipped'. Of the whole workspace, so
     // that dependencies have the features of the builds above and are not built again.
-    run(command(
-        "cargo clippy --workspace --all-targets --features elm-brdf/fetch --locked -- -D warnings",
-    ))?;
-    run(command(
+    run(linted(command(
         "cargo test --workspace --features elm-brdf/fetch --test all --locked \
          -- --include-ignored fetch:: help::",
-    ))?;
+    )))?;
 
     step("documentation, warnings are errors");
     let mut doc = command("cargo doc --workspace --no-deps --locked");

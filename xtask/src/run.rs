@@ -30,6 +30,13 @@ pub(crate) fn command(line: &str) -> Command {
     command
 }
 
+/// With clippy for a compiler and warnings as errors: what is tested is built once.
+pub(crate) fn linted(mut command: Command) -> Command {
+    command.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
+    command.env("RUSTFLAGS", "-D warnings");
+    command
+}
+
 fn shown(command: &Command) -> String {
     let name = Path::new(command.get_program()).file_stem();
     let arguments = command.get_args();

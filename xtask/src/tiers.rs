@@ -2,11 +2,12 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 use clap::Args;
 
 use crate::Result;
-use crate::run::{Counts, command, root, say, test};
+use crate::run::{Counts, command, linted, root, say, test};
 
 /// Which tests to run.
 #[derive(Args, Clone, Copy)]
@@ -20,6 +21,9 @@ pub(crate) struct Tiers {
     /// Only the tests that the other options add.
     #[arg(long)]
     only: bool,
+    /// Built by clippy, warnings as errors.
+    #[arg(skip)]
+    linted: bool,
 }
 
 /// A test that runs only when it is asked for.
@@ -35,6 +39,7 @@ impl Tiers {
             data: true,
             browser: true,
             only: false,
+            linted: false,
         }
     }
 
@@ -42,6 +47,19 @@ impl Tiers {
         Self {
             data: false,
             ..Self::everything()
+        }
+    }
+
+    pub(crate) fn linted(mut self) -> Self {
+        self.linted = true;
+        self
+    }
+
+    fn cargo(self, line: &str) -> Command {
+        if self.linted {
+            linted(command(line))
+        } else {
+            command(line)
         }
     }
 
@@ -65,7 +83,7 @@ impl Tiers {
                 .map(|test| test.name.as_str())
                 .collect();
             if asked {
-                counts.push((title, only(&names)?));
+                counts.push((title, self.only(&names)?));
             }
         }
         for (title, counts) in counts {
@@ -75,7 +93,7 @@ impl Tiers {
     }
 
     fn plain(self) -> Result<Counts> {
-        let counts = test(command("cargo test --workspace --locked"))?;
+        let counts = test(self.cargo("cargo test --workspace --locked"))?;
         let asked = if self.data && self.browser {
             "run below"
         } else {
@@ -87,6 +105,24 @@ impl Tiers {
         ));
         Ok(counts)
     }
+
+    /// Runs ignored tests of these names, and fails unless every one of them ran to its end.
+    fn only(self, names: &[&str]) -> Result<Counts> {
+        let mut cargo =
+            self.cargo("cargo test --workspace --locked --lib --bins --tests -- --ignored");
+        cargo.args(names);
+        let counts = test(cargo)?;
+        if let Some(first) = counts.skipped.first() {
+            return Err(format!(
+                "{} tests did not run: {first}",
+                counts.skipped.len()
+            ));
+        }
+        if counts.passed != names.len() {
+            return Err(format!("{} tests ran of {}", counts.passed, names.len()));
+        }
+        Ok(counts)
+    }
 }
 
 /// Whether all folders that tests look for are there; says which is not.
@@ -94,25 +130,6 @@ pub(crate) fn has_data() -> bool {
     let curet = elm_test_support::curet();
     let folders = ["rgl", "nbrdf"].map(elm_test_support::folder);
     curet.is_some() && folders.iter().all(Option::is_some)
-}
-
-/// Runs ignored tests of these names, and fails unless every one of them ran to its end.
-fn only(names: &[&str]) -> Result<Counts> {
-    let mut cargo = command("cargo test --workspace --locked --lib --bins --tests -- --ignored");
-    let counts = test({
-        cargo.args(names);
-        cargo
-    })?;
-    if let Some(first) = counts.skipped.first() {
-        return Err(format!(
-            "{} tests did not run: {first}",
-            counts.skipped.len()
-        ));
-    }
-    if counts.passed != names.len() {
-        return Err(format!("{} tests ran of {}", counts.passed, names.len()));
-    }
-    Ok(counts)
 }
 
 /// The tests with `#[ignore = "..."]` in all packages, by their functions' names. A reason that does not

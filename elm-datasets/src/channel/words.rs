@@ -5,6 +5,8 @@ pub(super) const VALUES: &[&str] = &[
     "brdf",
     "bsdf",
     "brf",
+    "hdrf",
+    "hcrf",
     "f",
     "fr",
     "value",

@@ -134,6 +134,16 @@ fn reflectance_factors_are_divided_by_pi() {
 }
 
 #[test]
+fn channels_of_reflectance_factors_keep_names_of_their_own() {
+    let dir = tempfile::tempdir().unwrap();
+    let text =
+        "theta_i,phi_i,theta_o,phi_o,BRF (2),HDRF,HCRF,BRF 550nm hcrf\n10,0,20,180,1,2,3,4\n";
+    let found = read(dir.path(), "a.csv", text, &degrees()).unwrap();
+    let expected = ["brdf (2)", "brdf", "brdf (3)", "brdf 550nm brdf"];
+    assert_eq!(found.samples.channels, expected);
+}
+
+#[test]
 fn an_angle_that_is_no_column_can_be_given() {
     let dir = tempfile::tempdir().unwrap();
     let text = "theta_o,phi_o,brdf\n30,180,0.25\n45,90,0.5\n";
