@@ -377,12 +377,19 @@ fn wavelength(names: &[String], rest: &[usize], choice: &Columns) -> Option<usiz
 /// All columns, where there is no doubt that they are reflectance.
 ///
 /// A single column needs no name that says so, as long as its name says nothing else. Of several, a
-/// name that says otherwise is an error; so is one that says nothing beside one that does say
-/// reflectance. Where no name says anything, there is nothing to tell them by.
+/// name that says otherwise is an error, as that of an angle that no direction needs; so is one that says
+/// nothing beside one that does say reflectance. Where no name says anything, there is nothing to tell
+/// them by.
 fn undisputed(names: &[String], rest: &[usize]) -> Result<Vec<usize>, Problem> {
-    let kinds: Vec<Kind> = rest.iter().map(|&c| channel::kind(&names[c])).collect();
+    let is_angle = |column: usize| names::of(&names[column]).is_some();
+    let kind = |&column: &usize| match is_angle(column) {
+        true => Kind::NoValue,
+        false => channel::kind(&names[column]),
+    };
+    let kinds: Vec<Kind> = rest.iter().map(kind).collect();
     if let &[only] = rest
         && !channel::is_one_word_for_something_else(&names[only])
+        && !is_angle(only)
     {
         return Ok(rest.to_vec());
     }

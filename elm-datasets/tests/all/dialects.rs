@@ -144,6 +144,23 @@ fn channels_of_reflectance_factors_keep_names_of_their_own() {
 }
 
 #[test]
+fn an_angle_that_no_direction_needs_is_no_value() {
+    let dir = tempfile::tempdir().unwrap();
+    for header in [
+        "theta_i,phi_i,theta_o,phi_o,dphi\n10,0,20,180,180\n",
+        "theta_i,phi_i,theta_o,phi_o,data,dphi\n10,0,20,180,0.1,180\n",
+        "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z,relative azimuth\n0,0,1,0,0,1,0\n",
+    ] {
+        let message = read(dir.path(), "a.csv", header, &degrees()).unwrap_err();
+        let message = message.to_string();
+        assert!(
+            message.contains("dphi") || message.contains("relative"),
+            "{message}"
+        );
+    }
+}
+
+#[test]
 fn an_angle_that_is_no_column_can_be_given() {
     let dir = tempfile::tempdir().unwrap();
     let text = "theta_o,phi_o,brdf\n30,180,0.25\n45,90,0.5\n";
