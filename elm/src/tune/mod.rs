@@ -34,7 +34,7 @@
 //! neurons, and of many rows is made once more with slopes of its own, and kept where that is better. Neurons
 //! are doubled, up to twice the usual number, where that takes a hundredth off the squared error of rows left
 //! out, beyond the usual number two; else they are halved while that costs no more than one. Where the
-//! held-out error is below a tenth of the targets' deviation the quick search is made as well, and the fit of
+//! held-out error is below a fifth of the targets' deviation the quick search is made as well, and the fit of
 //! the smaller error of rows left out is kept.
 //!
 //! A trial looks at 2000 rows at most. At the quick level nearly all trials of `auto` are of a hundred
@@ -116,7 +116,7 @@ pub enum Level {
 
 /// The held-out error, relative to the targets' deviation, below which targets are a smooth function with
 /// little noise, of which the exact search may make far more: it is made as well, and the better fit is kept.
-const SMOOTH: f64 = 0.1;
+const SMOOTH: f64 = 0.2;
 
 /// One setting that was tried.
 #[derive(Debug, Clone, PartialEq)]
