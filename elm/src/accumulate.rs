@@ -57,7 +57,7 @@ mod upper;
 
 use std::marker::PhantomData;
 
-use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis, Ix2, Zip, s};
+use ndarray::{Array1, Array2, ArrayRef2, ArrayView1, ArrayView2, Axis, Ix2, ShapeBuilder, Zip, s};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
@@ -66,7 +66,7 @@ use crate::check::{check_length, check_matrix};
 use crate::dataset::{Dataset, Inputs, TargetDim, Targets, check_outputs};
 use crate::error::{Error, Result};
 use crate::feature_map::{FeatureMap, HiddenLayer, Scaler};
-use crate::linalg::QrFactor;
+use crate::linalg::BAND;
 use crate::memory::check_room;
 use crate::model::ElmParams;
 use crate::network::Elm;
@@ -341,8 +341,7 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
             let range = s![start..x.nrows().min(start + block), ..];
             let x = x.slice(range);
             let h = self.map.apply(x);
-            check_matrix("hidden-layer matrix", h.view())?;
-            for (row, (h, t)) in h.rows().into_iter().zip(t.slice(range).rows()).enumerate() {
+            for (row, (h_row, t)) in h.rows().into_iter().zip(t.slice(range).rows()).enumerate() {
                 let weight = weights.map_or(A::one(), |weights| weights[start + row]);
                 self.rows = self.rows.saturating_add(1);
                 if weight == A::zero() {
@@ -354,10 +353,11 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
                     self.pending.push(root);
                 }
                 let first = self.pending.len();
-                self.pending
-                    .extend(h.iter().chain(t).map(|&value| value * root));
+                self.pending.extend(h_row.iter().map(|&value| value * root));
+                self.pending.extend(t.iter().map(|&value| value * root));
                 let row = &self.pending[first..];
                 if !row.iter().fold(true, |all, value| all & value.is_finite()) {
+                    check_matrix("hidden-layer matrix", h.view())?;
                     return Err(OVERFLOW);
                 }
                 if self.pending.len() == block * self.columns() {
@@ -403,21 +403,22 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
         }
         let pending = std::mem::take(&mut self.pending);
         let shape = (rows, self.columns());
-        let mut block = Array2::from_shape_vec(shape, pending).map_err(|_| OVERFLOW)?;
+        let block = Array2::from_shape_vec(shape, pending).map_err(|_| OVERFLOW)?;
         if self.keeps_products() {
             return self.add_rows(block);
         }
-        self.take_off(block.view_mut());
-        self.absorb(&block)
+        let shift = self.shift_for(&block);
+        self.absorb(&block, &shift)
     }
 
-    /// Factorizes the triangle with unscaled rows under it.
-    fn absorb(&mut self, rows: &ArrayRef2<A>) -> Result<()> {
+    /// Factorizes the triangle with unscaled rows of finite numbers under it, less `shift` times the first
+    /// value of each.
+    fn absorb(&mut self, rows: &ArrayRef2<A>, shift: &Array1<A>) -> Result<()> {
         let columns = self.columns();
-        if !rows.iter().all(|v| v.is_finite()) {
+        let (largest, before) = (largest_less(rows, shift), largest(&self.kept));
+        if !largest.iter().all(|v| v.is_finite()) {
             return Err(OVERFLOW);
         }
-        let (largest, before) = (largest(rows), largest(&self.kept));
         let mut factors = Array1::ones(columns);
         for (column, scale) in self.scales.iter_mut().enumerate() {
             let fresh = before[column] == A::zero();
@@ -428,13 +429,24 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
                 *scale = wanted;
             }
         }
-        let mut both = Array2::zeros((columns + rows.nrows(), columns));
+        let mut both = Array2::zeros((columns + rows.nrows(), columns).f());
         let (mut top, mut bottom) = both.view_mut().split_at(Axis(0), columns);
-        top.assign(&(&self.kept * &factors));
-        bottom.assign(rows);
-        bottom /= &self.scales;
-        let nothing = Array2::zeros((both.nrows(), 0));
-        let QrFactor { r, .. } = A::triangularize(both.view(), nothing.view())?;
+        Zip::from(&mut top)
+            .and(&self.kept)
+            .and_broadcast(&factors)
+            .for_each(|to, &kept, &factor| *to = kept * factor);
+        let frame = shift.iter().zip(&self.scales);
+        let bands = bottom.axis_chunks_iter_mut(Axis(0), BAND);
+        for (mut to, rows) in bands.zip(rows.axis_chunks_iter(Axis(0), BAND)) {
+            let columns = to.columns_mut().into_iter().zip(rows.columns());
+            for ((to, from), (&shift, &scale)) in columns.zip(frame.clone()) {
+                Zip::from(to)
+                    .and(from)
+                    .and(rows.column(0))
+                    .for_each(|to, &value, &root| *to = (value - root * shift) / scale);
+            }
+        }
+        let r = A::triangle(both)?;
         if !r.iter().all(|v| v.is_finite()) {
             return Err(OVERFLOW);
         }
@@ -445,11 +457,20 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
 
 /// The largest magnitude in each column.
 fn largest<A: Scalar>(rows: &ArrayRef2<A>) -> Array1<A> {
+    largest_less(rows, &Array1::zeros(rows.ncols()))
+}
+
+/// The largest magnitude in each column of rows less `shift` times their first value.
+fn largest_less<A: Scalar>(rows: &ArrayRef2<A>, shift: &Array1<A>) -> Array1<A> {
     let mut largest = Array1::zeros(rows.ncols());
     for row in rows.rows() {
+        let root = row[0];
         Zip::from(&mut largest)
             .and(row)
-            .for_each(|m: &mut A, v| *m = m.max(v.abs()));
+            .and(shift)
+            .for_each(|most: &mut A, &value, &shift| {
+                *most = most.max((value - root * shift).abs());
+            });
     }
     largest
 }

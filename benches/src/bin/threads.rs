@@ -91,9 +91,11 @@ fn main() -> Result<(), Error> {
             .collect())
     })?;
     let model = ElmParams::new(500).fit(&x, &t)?;
-    compare("predictions, 20000 x 20, 500 neurons", threads, 21, || {
-        Ok(model.predict(&x)?.to_vec())
-    })?;
+    for (count, pairs) in [(20_000, 21), (200_000, 9)] {
+        let (x, _) = rows(count, 20)?;
+        let what = format!("predictions, {count} x 20, 500 neurons");
+        compare(&what, threads, pairs, || Ok(model.predict(&x)?.to_vec()))?;
+    }
     let (x, t) = rows(100_000, 20)?;
     let params = ElmParams::new(300);
     compare("accumulation, 100000 x 20, 300 neurons", threads, 5, || {

@@ -1,6 +1,8 @@
 //! What carries rows from one accumulator to another: merging, and a compact form.
 
-use super::Accumulator;
+use ndarray::Array1;
+
+use super::{Accumulator, OVERFLOW};
 use crate::dataset::TargetDim;
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
@@ -48,7 +50,10 @@ impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
             } else {
                 let mut rows = &other.kept * &other.scales;
                 self.take_over(&other, rows.view_mut());
-                self.absorb(&rows)?;
+                if !rows.iter().all(|value| value.is_finite()) {
+                    return Err(OVERFLOW);
+                }
+                self.absorb(&rows, &Array1::zeros(rows.ncols()))?;
             }
         } else {
             self.take_pending(&other.pending)?;

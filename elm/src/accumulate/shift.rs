@@ -13,19 +13,15 @@ use crate::scalar::Scalar;
 use crate::stats;
 
 impl<A: Scalar, D: TargetDim> Accumulator<A, D> {
-    /// Takes what belongs to it off weighted rows, which are as they were pushed; the first rows say
-    /// what that is.
-    pub(super) fn take_off(&mut self, mut rows: ArrayViewMut2<'_, A>) {
-        if !self.intercept {
-            return;
+    /// What each column of weighted rows, which are as they were pushed, is taken less of, in units of the
+    /// first column, which is left as it is; the first rows say what that is.
+    pub(super) fn shift_for(&mut self, rows: &ArrayRef2<A>) -> Array1<A> {
+        let mut all = Array1::zeros(rows.ncols());
+        if self.intercept {
+            let shift = self.shift.get_or_insert_with(|| near_means(rows));
+            all.slice_mut(s![1..]).assign(shift);
         }
-        let shift = self.shift.get_or_insert_with(|| near_means(&rows));
-        for mut row in rows.rows_mut() {
-            let (root, values) = row.view_mut().split_at(ndarray::Axis(0), 1);
-            for (value, &shift) in values.into_iter().zip(&*shift) {
-                *value -= root[0] * shift;
-            }
-        }
+        all
     }
 
     /// Rows from which `other` has taken its own, as rows from which this has.

@@ -25,7 +25,7 @@ use ndarray::{Array1, Array2, ArrayView2, Axis, CowArray, Ix2, ShapeBuilder, s};
 use num_traits::Zero;
 use pulp::{Simd, WithSimd};
 
-use super::{Backend, CholeskySolve, Eigen, Failure, QrFactor, Svd};
+use super::{BAND, Backend, CholeskySolve, Eigen, Failure, QrFactor, Svd};
 use crate::simd::{Lanes, Level, Real};
 use crate::threads;
 use decompositions::{decompose, eigen, singular_values};
@@ -35,9 +35,26 @@ const PAR: Par = Par::Seq;
 
 /// A copy laid out by columns, as the factorizations want it.
 fn by_columns<A: Copy + Zero>(a: ArrayView2<'_, A>) -> Array2<A> {
+    if a.t().is_standard_layout() {
+        return a.to_owned();
+    }
     let mut out = Array2::zeros(a.dim().f());
-    out.assign(&a);
+    let bands = out.axis_chunks_iter_mut(Axis(0), BAND);
+    for (mut to, from) in bands.zip(a.axis_chunks_iter(Axis(0), BAND)) {
+        for (mut to, from) in to.columns_mut().into_iter().zip(from.columns()) {
+            to.assign(&from);
+        }
+    }
     out
+}
+
+/// The array itself where it is laid out by columns, else a copy that is.
+fn into_columns<A: Copy + Zero>(a: Array2<A>) -> Array2<A> {
+    if a.t().is_standard_layout() {
+        a
+    } else {
+        by_columns(a.view())
+    }
 }
 
 /// The array itself where it lies without gaps, else a copy that does.
@@ -103,10 +120,10 @@ fn parts(work: usize) -> usize {
     (work / (4 * threads::WORTHWHILE)).clamp(1, MOST)
 }
 
-/// A copy of a matrix in which [`factorize`] has left its triangle and reflections, and their factors.
-fn factorized<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>) -> (Array2<A>, Array2<A>) {
-    let (rows, columns) = a.dim();
-    let mut basis = by_columns(a);
+/// A matrix laid out by columns in which [`factorize`] has left its triangle and reflections, and their
+/// factors.
+fn factorized<A: RealField + Copy + Zero>(mut basis: Array2<A>) -> (Array2<A>, Array2<A>) {
+    let (rows, columns) = basis.dim();
     let block = qr::factor::recommended_block_size::<A>(rows, columns);
     let mut factor = Array2::zeros((block, columns).f());
     let mut memory = MemBuffer::new(householder_scratch::<A>(rows, block, columns));
@@ -115,12 +132,21 @@ fn factorized<A: RealField + Copy + Zero>(a: ArrayView2<'_, A>) -> (Array2<A>, A
     (basis, factor)
 }
 
-/// The triangle that [`factorize`] leaves.
+/// The triangle that [`factorize`] leaves, by rows.
 fn upper<A: Copy + Zero>(basis: &Array2<A>) -> Array2<A> {
     let columns = basis.ncols();
-    Array2::from_shape_fn((columns, columns), |(i, j)| {
-        if i <= j { basis[[i, j]] } else { A::zero() }
-    })
+    let mut out = Array2::zeros((columns, columns));
+    for first in (0..columns).step_by(BAND) {
+        let band = first..columns.min(first + BAND);
+        // What a band of columns holds above its own diagonal block is a rectangle.
+        let place = s![..first, band.clone()];
+        out.slice_mut(place).assign(&basis.slice(place));
+        for column in band {
+            let place = s![first..=column, column];
+            out.slice_mut(place).assign(&basis.slice(place));
+        }
+    }
+    out
 }
 
 /// Hands slabs of columns to `apply`, on several threads where `work` multiplications for each column are
@@ -147,7 +173,7 @@ fn triangularize<A: RealField + Copy + Zero + std::ops::Mul<Output = A>>(
     b: ArrayView2<'_, A>,
 ) -> QrFactor<A> {
     let (rows, columns) = a.dim();
-    let (basis, factor) = factorized(a);
+    let (basis, factor) = factorized(by_columns(a));
     let mut qtb = by_columns(b);
     in_slabs(view_mut(&mut qtb), 2 * rows * columns, |slab| {
         let scratch = sequence_scratch::<A>(rows, factor.nrows(), slab.ncols());
@@ -291,11 +317,7 @@ fn solve_square<A: RealField + Copy + Zero + PartialEq>(
 }
 
 fn cholesky<A: RealField + Copy + Zero>(a: Array2<A>) -> Result<Array2<A>, Failure> {
-    let mut factor = if a.t().is_standard_layout() {
-        a
-    } else {
-        by_columns(a.view())
-    };
+    let mut factor = into_columns(a);
     let n = factor.nrows();
     let scratch = llt::factor::cholesky_in_place_scratch::<A>(n, PAR, Default::default());
     llt::factor::cholesky_in_place(
@@ -408,6 +430,10 @@ macro_rules! kernel {
                 b: ArrayView2<'_, Self>,
             ) -> Result<QrFactor<Self>, Failure> {
                 Ok(clean(triangularize(a, b)))
+            }
+
+            fn triangle(a: Array2<Self>) -> Result<Array2<Self>, Failure> {
+                Ok(clean(upper(&factorized(into_columns(a)).0)))
             }
 
             fn solve_upper(

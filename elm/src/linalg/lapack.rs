@@ -173,6 +173,11 @@ macro_rules! kernel {
                 triangularize(a, b)
             }
 
+            fn triangle(a: Array2<Self>) -> Result<Array2<Self>, Failure> {
+                sequential();
+                Ok(by_rows(a.view()).qr_into().map_err(no_convergence)?.1)
+            }
+
             fn solve_upper(
                 r: ArrayView2<'_, Self>,
                 b: ArrayView2<'_, Self>,

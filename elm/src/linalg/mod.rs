@@ -15,6 +15,9 @@ compile_error!("elm-learn needs a linear algebra back end: feature `faer` or `op
 use ndarray::{Array1, Array2, ArrayView2, ShapeBuilder};
 use num_traits::Zero;
 
+/// Rows or columns that are copied together where a matrix changes its layout: both sides stay in cache.
+pub(crate) const BAND: usize = 32;
+
 /// The linear algebra back end that this build uses, `"faer"` or `"openblas"`.
 #[must_use]
 pub fn backend() -> &'static str {
@@ -99,6 +102,9 @@ pub trait Backend: Sized {
         a: ArrayView2<'_, Self>,
         b: ArrayView2<'_, Self>,
     ) -> Result<QrFactor<Self>, Failure>;
+
+    /// $R$ alone, for `a` with at least as many rows as columns, whose place it may take.
+    fn triangle(a: Array2<Self>) -> Result<Array2<Self>, Failure>;
 
     /// Solves $R X = B$ for square $R$, of which the upper half is read.
     fn solve_upper(

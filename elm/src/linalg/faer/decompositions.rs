@@ -16,7 +16,7 @@ use faer::{Auto, Conj, Spec};
 use ndarray::{Array1, Array2, ArrayView2, Axis, ShapeBuilder, s};
 use num_traits::Zero;
 
-use super::{PAR, factorized, gapless, in_slabs, upper, view, view_mut};
+use super::{PAR, by_columns, factorized, gapless, in_slabs, upper, view, view_mut};
 use crate::linalg::{Eigen, Failure, Svd};
 
 pub(super) fn eigen<A: RealField + Copy + Zero + PartialOrd>(
@@ -135,7 +135,7 @@ fn decompose_by_triangle<A: RealField + Copy + Zero>(
     a: ArrayView2<'_, A>,
 ) -> Result<Svd<A>, Failure> {
     let (rows, columns) = a.dim();
-    let (basis, factor) = factorized(a);
+    let (basis, factor) = factorized(by_columns(a));
     let Svd { u: inner, s, vt } = decompose(upper(&basis).view())?;
     let mut u = Array2::zeros((rows, columns).f());
     u.slice_mut(s![..columns, ..]).assign(&inner);
