@@ -189,6 +189,52 @@ async fn several_targets_weights_and_nulls() {
     assert!(query(&context, text).await.unwrap().column(0).is_null(0));
 }
 
+/// Filters, NULLs and rows that are passed on as states one by one: the models of the rows that are left.
+#[tokio::test]
+async fn groups_have_the_models_of_their_rows_alone() {
+    let by_sensor = |what: &str, rows: &str| {
+        format!("SELECT sensor, {what} AS m FROM rows {rows} GROUP BY sensor ORDER BY sensor")
+    };
+    let models = async |context: &SessionContext, text: &str| -> Vec<Vec<u8>> {
+        let found = query(context, text).await.unwrap();
+        (0..found.num_rows())
+            .map(|row| bytes(&found, 1, row))
+            .collect()
+    };
+    let one_by_one = [
+        "SET datafusion.execution.skip_partial_aggregation_probe_ratio_threshold = 0",
+        "SET datafusion.execution.skip_partial_aggregation_probe_rows_threshold = 1",
+    ];
+    let mut found = Vec::new();
+    for options in [&[][..], &one_by_one] {
+        let context = session(3, options).await.unwrap();
+        context.sql("SET elm.neurons = 20").await.unwrap();
+        let rows = by_sensor("elm_fit(y, x1, x2)", "WHERE x1 > 0 OR sensor = 3");
+        let expected = models(&context, &rows).await;
+        assert_eq!(expected.len(), 5);
+        let filtered = "elm_fit(y, x1, x2) FILTER (WHERE x1 > 0 OR sensor = 3)";
+        let nulls = "elm_fit(y, x1, CASE WHEN x1 > 0 OR sensor = 3 THEN x2 END)";
+        for what in [filtered, nulls] {
+            assert_eq!(
+                models(&context, &by_sensor(what, "")).await,
+                expected,
+                "{what}"
+            );
+        }
+        context.sql("SET elm.nulls = 'error'").await.unwrap();
+        let error = query(&context, &by_sensor(nulls, "")).await.unwrap_err();
+        assert!(error.to_string().contains("is NULL"), "{error}");
+        // A NULL that the filter keeps out is none.
+        let both = nulls.to_owned() + " FILTER (WHERE x1 > 0 OR sensor = 3)";
+        assert_eq!(models(&context, &by_sensor(&both, "")).await, expected);
+        let none = by_sensor("elm_fit(y, x1, x2) FILTER (WHERE sensor <> 2)", "");
+        let error = query(&context, &none).await.unwrap_err().to_string();
+        assert!(error.contains("no rows to fit"), "{error}");
+        found.push(expected);
+    }
+    assert_eq!(found[0], found[1]);
+}
+
 #[tokio::test]
 async fn errors_say_what_is_wrong_and_where() {
     let context = session(2, &[]).await.unwrap();
