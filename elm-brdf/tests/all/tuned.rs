@@ -291,3 +291,40 @@ fn the_size_of_a_network_is_bounded_by_what_was_measured() {
     let stored = fit(&pairs, &values, 1).stored_floats();
     assert!((300..=525).contains(&stored), "{stored}");
 }
+
+/// A lobe so narrow that few measurements carry most of the squares: between them more neurons err no more
+/// than few do, beyond what the draws of measurements and networks explain.
+#[test]
+fn a_larger_network_is_not_wilder_between_measurements() {
+    fn gloss(angles: &Cosines) -> f64 {
+        0.05 / PI + angles.ggx(0.03) * (0.05 + 0.95 * angles.schlick())
+    }
+    const SEEDS: u64 = 4;
+    // Logarithms of the relative errors of few neurons and of many.
+    let errors = |seed: u64| {
+        let pairs = scattered(1200, 1.4, 20 + seed);
+        let values = measured(gloss, &pairs, 0.01);
+        let largest = values.iter().fold(0.0, |most: f64, value| most.max(*value));
+        let mut between = scattered(3000, 1.4, 40 + seed);
+        between.retain(|pair| value(gloss, pair) <= largest);
+        let scale = root_mean_square(gloss, &between);
+        [100, 500].map(|max_floats| {
+            let tuned = Tuned {
+                seed,
+                max_floats: Some(max_floats),
+                ..Tuned::default()
+            };
+            let model = tuned.fit_model(&pairs, values.view()).unwrap();
+            (rmse(&model, gloss, &between) / scale).ln()
+        })
+    };
+    let all: Vec<[f64; 2]> = (1..=SEEDS).map(errors).collect();
+    println!("{all:?}");
+    let rises: Vec<f64> = all.iter().map(|[few, many]| many - few).collect();
+    let mean = rises.iter().sum::<f64>() / SEEDS as f64;
+    let squares: f64 = rises.iter().map(|rise| (rise - mean).powi(2)).sum();
+    let error = (squares / (SEEDS * (SEEDS - 1)) as f64).sqrt();
+    assert!(mean <= 2.0 * error, "{all:?}");
+    // Nor is any a multiple of the values themselves.
+    assert!(all.iter().all(|[_, many]| *many < 0.0), "{all:?}");
+}
