@@ -30,8 +30,9 @@ const SEARCH_NEURONS: usize = 96;
 pub(super) const RIDGE: f64 = 3e-8;
 /// A scale is moved by this factor, then by its root.
 const STEPS: [f64; 2] = [2.0, 1.414];
-/// Sets that are fitted to all rows to choose between them, if they come close.
-const FINISHED: usize = 2;
+/// Sets that are fitted to all rows to choose between them, if they come close: the search's small networks do
+/// not tell which of these large ones do best with.
+const FINISHED: usize = 3;
 /// How close that is.
 const CLOSE: f64 = 1.15;
 /// Sets that are fitted to all rows, at most, where none returns less light than it receives.
@@ -79,7 +80,8 @@ pub(super) fn best(
     for (number, setting) in settings.iter().enumerate() {
         let physical = found.as_ref().is_some_and(|found| found.excess <= 0.0);
         let usual = setting.set == Features::SumDifference;
-        let close = usual || number < FINISHED && setting.error <= CLOSE * settings[0].error;
+        let within = |factor: f64| setting.error <= factor * settings[0].error;
+        let close = usual && within(FAR) || number < FINISHED && within(CLOSE);
         if physical && !close || number >= MAX_FINISHED && !usual {
             continue;
         }
