@@ -35,7 +35,8 @@ pub(super) enum Separator {
 }
 
 impl Separator {
-    /// What separates the words of a header: that by which most of them name directions.
+    /// What separates the words of a header: the first by which two of them name directions. Not that by
+    /// which most do: the name of a column of values may hold any number of such words.
     fn of(header: &str) -> Self {
         let named = |separator: &Self| {
             let cells = separator.cells(header);
@@ -44,10 +45,10 @@ impl Separator {
                 .filter(|cell| names::of(cell).is_some())
                 .count()
         };
-        // Of equals the last is taken, a comma before all.
-        [Self::Blanks, Self::Tab, Self::Semicolon, Self::Comma]
-            .into_iter()
-            .max_by_key(named)
+        let mut all = [Self::Comma, Self::Semicolon, Self::Tab, Self::Blanks].into_iter();
+        let enough = all.clone().find(|separator| named(separator) >= 2);
+        enough
+            .or_else(|| all.find(|separator| named(separator) > 0))
             .unwrap_or(Self::Comma)
     }
 
@@ -283,6 +284,10 @@ mod tests {
             ),
             ("# theta_i phi_i v\n1 2 3\n", "  theta_i,phi_i,v\n1,2,3\n"),
             (
+                "theta_i\tphi_i\tfor SZA VZA RAA\n1\t2\t3\n",
+                "theta_i,phi_i,for SZA VZA RAA\n1,2,3\n",
+            ),
+            (
                 "Made by hand\n\ntheta_i,phi_i\n1,2\n",
                 "\r\r\r\r\r\r\r\r\r\r\r\r\n\ntheta_i,phi_i\n1,2\n",
             ),
@@ -294,6 +299,8 @@ mod tests {
     #[test]
     fn plain_tables_are_not_copied() {
         assert!(Text::of(b"theta_i,phi_i\n1,2\n").is_none());
+        // Whatever the name of a column of values says.
+        assert!(Text::of(b"theta_i,phi_i,for SZA VZA RAA\n1,2,3\n").is_none());
     }
 
     #[test]

@@ -30,8 +30,8 @@ const SEARCH_NEURONS: usize = 96;
 pub(super) const RIDGE: f64 = 3e-8;
 /// A scale is moved by this factor, then by its root.
 const STEPS: [f64; 2] = [2.0, 1.414];
-/// Sets that are fitted to all rows to choose between them, if they come close: the search's small networks do
-/// not tell which of these large ones do best with.
+/// Sets that are fitted to all rows to choose between them, if they come close: the search's networks are too
+/// small to tell them apart.
 const FINISHED: usize = 3;
 /// How close that is.
 const CLOSE: f64 = 1.15;
