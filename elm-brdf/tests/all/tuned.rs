@@ -293,7 +293,8 @@ fn the_size_of_a_network_is_bounded_by_what_was_measured() {
 }
 
 /// A lobe so narrow that few measurements carry most of the squares: between them more neurons err no more
-/// than few do, beyond what the draws of measurements and networks explain.
+/// than few do, beyond what the draws of measurements and networks explain. Four draws see a blow-up, not a
+/// rise by a tenth, which is what one set of 1,200 measurements with 1 % of noise had (0.017 to 0.019).
 #[test]
 fn a_larger_network_is_not_wilder_between_measurements() {
     fn gloss(angles: &Cosines) -> f64 {
@@ -319,7 +320,6 @@ fn a_larger_network_is_not_wilder_between_measurements() {
         })
     };
     let all: Vec<[f64; 2]> = (1..=SEEDS).map(errors).collect();
-    println!("{all:?}");
     let rises: Vec<f64> = all.iter().map(|[few, many]| many - few).collect();
     let mean = rises.iter().sum::<f64>() / SEEDS as f64;
     let squares: f64 = rises.iter().map(|rise| (rise - mean).powi(2)).sum();
